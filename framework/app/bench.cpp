@@ -161,11 +161,11 @@ void measure(Registry& registry, Row& row, const std::string& kinematics, const 
     const auto check = [](const EvaluationStatus& status) {
       if (!status.ok()) throw RunError(fmt::format("bench: {}", status.description));
     };
-    row.tangent = fastest([&] { check(problem.tangent_action(problem.state().displacement(), w, Kw)); }) / points;
+    row.tangent = fastest([&] { check(problem.tangent_action({problem.state().displacement(), 0}, w, Kw)); }) / points;
     if (!options.assembly) return;
     BlockMatrix K;
-    check(problem.assemble_tangent(problem.state().displacement(), K));   // with the pattern, which later ones keep
-    row.assembly = fastest([&] { check(problem.assemble_tangent(problem.state().displacement(), K)); }) / points;
+    check(problem.assemble_tangent({problem.state().displacement(), 0}, K));   // with the pattern, which later ones keep
+    row.assembly = fastest([&] { check(problem.assemble_tangent({problem.state().displacement(), 0}, K)); }) / points;
   };
   timed(4, false);
   if (counts_operations) return;

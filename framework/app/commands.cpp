@@ -146,7 +146,7 @@ std::string time_of_forces(Simulation& simulation) {
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k) {
     const auto start = std::chrono::steady_clock::now();
-    if (!problem.evaluate_forces(u, force, nullptr).ok()) return {};
+    if (!problem.evaluate_forces({u, 0}, force, nullptr).ok()) return {};
     least = std::min(least, seconds_since(start));
   }
   return fmt::format("time          about {:.3g} ms a force evaluation, with {} thread{}\n", 1e3 * least, thread_count(), thread_count() > 1 ? "s" : "");

@@ -116,7 +116,7 @@ Values evaluate(const Case& c, Registry& registry) {
     u.view().component(a)[p] = 0.03 * x[static_cast<std::size_t>((a + 1) % c.dimension)] + 0.05 * std::sin(1.3 * x[0] + 1.7 * x[1] + 0.9 * x[2] + a);
   });
   Values values;
-  if (const EvaluationStatus status = problem.evaluate_forces(u.view(), force.view(), &values.energy); !status.ok()) throw RunError(status.description);
+  if (const EvaluationStatus status = problem.evaluate_forces({u.view(), 0}, force.view(), &values.energy); !status.ok()) throw RunError(status.description);
   each_component([&](const Point& x, std::int32_t p, int a) {
     const double f = force.view().component(a)[p];
     values.force_sum += std::abs(f);

@@ -16,8 +16,8 @@ class Evaluate final : public Integrator {
   void run(Problem& problem, Observer& observer) override {
     refuse_damage(problem);
     State& state = problem.state();
-    if (problem.loads().any()) problem.external_forces(state.displacement(), 0.0, state.external_force());
-    const EvaluationStatus status = problem.evaluate_forces(state.displacement(), state.internal_force(), &state.energies.strain);
+    if (problem.loads().any()) problem.external_forces(problem.configuration(), state.external_force());
+    const EvaluationStatus status = problem.evaluate_forces(problem.configuration(), state.internal_force(), &state.energies.strain);
     if (!status.ok()) throw RunError(status.description);
     observer.wants_sample(0, 0.0);
     observer.step_done({});

@@ -8,7 +8,7 @@ TangentMatrix::TangentMatrix(Problem& problem, SUNContext context) {
   // The pattern does not depend on the state.
   const Field rest = problem.make_field();
   BlockMatrix K;
-  if (!problem.assemble_tangent(rest, K).ok()) throw RunError("kinsol: the tangent of the undeformed body cannot be assembled");
+  if (!problem.assemble_tangent({rest, 0}, K).ok()) throw RunError("kinsol: the tangent of the undeformed body cannot be assembled");
   const ConstFieldView mask = problem.constraints().free();
   free_ = FreeMatrix(K, mask);
   free_.pattern(K, false, first_, row_);

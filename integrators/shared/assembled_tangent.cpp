@@ -9,7 +9,7 @@ bool AssembledTangent::assemble_as(Equilibrium& equilibrium, ConstFieldView u, b
   solver_.watch([&equilibrium] { return equilibrium.goes_on(); });
   matrix_.convex = convex;
   factorised_ = false;
-  const EvaluationStatus status = equilibrium.problem().assemble_tangent(u, matrix_);
+  const EvaluationStatus status = equilibrium.problem().assemble_tangent(equilibrium.at(u), matrix_);
   if (!status.ok()) failure = status.description.empty() ? "the tangent met an inadmissible deformation" : status.description;
   return status.ok();
 }

@@ -59,7 +59,7 @@ BondJacobian::BondJacobian(Problem& problem, NewtonIteration& newton, Linearised
 int BondJacobian::multiply(void* self, N_Vector w, N_Vector Jw) {
   auto& own = *static_cast<BondJacobian*>(self);
   if (!own.equilibrium_->tangent(own.u_, field_of(w), field_of(Jw))) return -1;
-  const EvaluationStatus status = own.bonds_->add_tangent(own.u_, field_of(w), field_of(Jw));
+  const EvaluationStatus status = own.bonds_->add_tangent(own.equilibrium_->at(own.u_), field_of(w), field_of(Jw));
   mask(own.equilibrium_->free(), field_of(Jw));
   return status.ok() ? 0 : -1;
 }
@@ -96,7 +96,7 @@ bool BondJacobian::forecast_bonds(Equilibrium& equilibrium, ConstFieldView u, Co
   equilibrium.note(fmt::format("  bonds: gmres {:3} to {:.1e}{}", SUNLinSolNumIters(gmres_.get()), SUNLinSolResNorm(gmres_.get()) / size,
                                solved ? "" : "; no forecast"));
   // Past a limit of stability the equations lead back, to a state before it.
-  return solved && dot(du_, r) > 0 && bonds_->weaken(u_, du_);
+  return solved && dot(du_, r) > 0 && bonds_->weaken(equilibrium.at(u_), du_);
 }
 
 }  // namespace perikit

@@ -36,7 +36,7 @@ bool TangentAction::difference(Equilibrium& equilibrium, ConstFieldView w, Field
   const double eps = std::cbrt(std::numeric_limits<double>::epsilon()) * problem_.body().spacing() / largest;
   for (const double sign : {1.0, -1.0}) {
     combine(1, u_, sign * eps, w, moved_);
-    const EvaluationStatus status = problem_.evaluate_forces(moved_, sign > 0 ? Kw : FieldView(force_), nullptr);
+    const EvaluationStatus status = problem_.evaluate_forces(equilibrium.at(moved_), sign > 0 ? Kw : FieldView(force_), nullptr);
     if (!status.ok()) {
       failure = status.description;
       return false;

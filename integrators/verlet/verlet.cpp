@@ -39,7 +39,7 @@ class Stepper final : private PointMotion {
 
   /// Loads at the present state.
   void load() {
-    const EvaluationStatus status = problem_.external_forces(u_, state_.time, external_);
+    const EvaluationStatus status = problem_.external_forces(problem_.configuration(), external_);
     if (!status.ok())
       throw RunError(
           fmt::format("step {}, time {:.6g} s: loads that follow the surface: {}", state_.step, state_.time, status.description));
@@ -47,8 +47,8 @@ class Stepper final : private PointMotion {
 
   /// Forces after the motion that `advance` has left to it; without one, at the present displacements.
   void evaluate(double* energy, double dt) {
-    const EvaluationStatus status =
-        pending() ? problem_.move_and_evaluate_forces(*this, u_, force_, energy, dt) : problem_.evaluate_forces(u_, force_, energy, dt);
+    const Configuration at(u_, state_.time, dt, v_);
+    const EvaluationStatus status = problem_.evaluate_forces(pending() ? at.moving(*this) : at, force_, energy);
     if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", state_.step, state_.time, status.description));
   }
 

@@ -30,20 +30,16 @@ class TimedProblem final : public contract::ForwardingProblem {
   bool late() const noexcept { return std::clock() > until_; }
   Share forces, actions, assemblies, companions;
 
-  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {
+  EvaluationStatus evaluate_forces(const Configuration& at, FieldView force, double* energy) override {
     if (late()) return {.point = 0, .description = "time is up"};
-    return timed(forces, [&] { return of_.evaluate_forces(u, force, energy, time_step); });
+    return timed(forces, [&] { return of_.evaluate_forces(at, force, energy); });
   }
-  EvaluationStatus move_and_evaluate_forces(PointMotion& motion, ConstFieldView u, FieldView force, double* energy, double time_step) override {
+  EvaluationStatus tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) override {
     if (late()) return {.point = 0, .description = "time is up"};
-    return timed(forces, [&] { return of_.move_and_evaluate_forces(motion, u, force, energy, time_step); });
+    return timed(actions, [&] { return of_.tangent_action(at, w, Kw); });
   }
-  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
-    if (late()) return {.point = 0, .description = "time is up"};
-    return timed(actions, [&] { return of_.tangent_action(u, w, Kw); });
-  }
-  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override {
-    return timed(assemblies, [&] { return of_.assemble_tangent(u, K); });
+  EvaluationStatus assemble_tangent(const Configuration& at, BlockMatrix& K) override {
+    return timed(assemblies, [&] { return of_.assemble_tangent(at, K); });
   }
   void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override {
     timed(companions, [&] { return of_.assemble_companion(u, K, most_bulk), 0; });

@@ -44,7 +44,7 @@ std::vector<Law> materials() {
 
 BlockMatrix assembled(BodyProblem& problem, ConstFieldView u) {
   BlockMatrix K;
-  const EvaluationStatus status = problem.assemble_tangent(u, K);
+  const EvaluationStatus status = problem.assemble_tangent({u, 0}, K);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return K;
 }
@@ -112,7 +112,7 @@ TEST_CASE("kinematics: the assembled tangent is the tangent action and symmetric
       Noise random(72);
       set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
       expected.fill(std::numeric_limits<double>::quiet_NaN());
-      REQUIRE(problem.tangent_action(problem.state().displacement(), w, expected).ok());
+      REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, expected).ok());
       const BlockMatrix K = assembled(problem, problem.state().displacement());
       REQUIRE(K.dimension == body.dimension());
       REQUIRE(K.rows() == body.points());
@@ -152,9 +152,9 @@ TEST_CASE("kinematics: the assembled tangent is bitwise the same for one and two
     // A second state into the same matrix, and back.
     const Field rest = problem.make_field();
     const double* values = two.values.data();
-    REQUIRE(problem.assemble_tangent(rest, two).ok());
+    REQUIRE(problem.assemble_tangent({rest, 0}, two).ok());
     CHECK(one.values != two.values);
-    REQUIRE(problem.assemble_tangent(problem.state().displacement(), two).ok());
+    REQUIRE(problem.assemble_tangent({problem.state().displacement(), 0}, two).ok());
     CHECK(values == two.values.data());
     CHECK(same_pattern(one, two));
     CHECK_MESSAGE(one.values == two.values, "the values depend on what was there before");
@@ -189,9 +189,9 @@ TEST_CASE("kinematics: assembling reports an inadmissible deformation") {
     if (!problem.terms().has_gradients())
       set_field(body, problem.state().displacement(), [&](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
     Field f = problem.make_field();
-    const EvaluationStatus expected = problem.evaluate_forces(problem.state().displacement(), f, nullptr);
+    const EvaluationStatus expected = problem.evaluate_forces({problem.state().displacement(), 0}, f, nullptr);
     BlockMatrix K;
-    const EvaluationStatus status = problem.assemble_tangent(problem.state().displacement(), K);
+    const EvaluationStatus status = problem.assemble_tangent({problem.state().displacement(), 0}, K);
     REQUIRE(!expected.ok());
     CHECK(!status.ok());
     CHECK(status.description.find("point") != std::string::npos);

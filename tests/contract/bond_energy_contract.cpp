@@ -31,7 +31,7 @@ double respond(BodyProblem& problem, std::uint64_t seed) {
   }
   Field force = problem.make_field();
   double energy = 0;
-  const EvaluationStatus status = problem.evaluate_forces(u, force, &energy);
+  const EvaluationStatus status = problem.evaluate_forces({u, 0}, force, &energy);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return energy;
 }
@@ -60,13 +60,13 @@ std::set<std::pair<std::int32_t, std::int32_t>> fail_screened_or_not(BodyOptions
   const auto screened = build(text), unscreened = build(text), slow = build(scene_text(options, kinematics));
   respond(screened->problem(), 23);
   const FieldView u = screened->problem().state().displacement();
-  const BondUpdate update = screened->problem().terms().update_bonds(u);
+  const BondUpdate update = screened->problem().terms().update_bonds({u, 0});
   CHECK(update.changed > 0);
   CHECK(update.changed < bonds);
   std::set<std::pair<std::int32_t, std::int32_t>> failed;
   for (const BondChange& b : screened->problem().terms().changed_bonds()) failed.emplace(b.bond.point, b.bond.far);
   for (auto* other : {unscreened.get(), slow.get()}) {
-    CHECK(other->problem().terms().update_bonds(u).changed == update.changed);
+    CHECK(other->problem().terms().update_bonds({u, 0}).changed == update.changed);
     for (const BondChange& b : other->problem().terms().changed_bonds()) CHECK(failed.contains({b.bond.point, b.bond.far}));
   }
   return failed;
@@ -84,7 +84,7 @@ TEST_CASE("kinematics: bonds share the stored energy, and those that hold the mo
         const auto plain = build(scene_text(options, kinematics_table(example)));
         const double whole = respond(plain->problem(), 23);
         const Body& body = plain->problem().body();
-        const std::vector<BondEnergy> shares = plain->problem().terms().bond_energies(plain->problem().state().displacement());
+        const std::vector<BondEnergy> shares = plain->problem().terms().bond_energies({plain->problem().state().displacement(), 0});
         double sum = 0;
         std::vector<double> densities;
         const auto density = [&](const BondEnergy& b) {
@@ -141,17 +141,17 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
         const FieldView u = problem.state().displacement();
         const bool higher = formulation.order > 1, parts = formulation.weighted && formulation.parts(d) > 0;
         if (formulation.pairs || (higher && (formulation.selective() || !example.stabilization.empty())) || (parts && formulation.selective())) {
-          CHECK_THROWS_AS(problem.terms().released_energies(u), std::logic_error);
+          CHECK_THROWS_AS(problem.terms().released_energies({u, 0}), std::logic_error);
           continue;
         }
         // Some bonds have weakened.
-        std::vector<BondEnergy> released = problem.terms().released_energies(u);
+        std::vector<BondEnergy> released = problem.terms().released_energies({u, 0});
         std::mt19937_64 random(7);
         std::vector<BondChange> state;
         for (std::size_t k = 0; k < released.size(); k += 1 + random() % 3)
           state.push_back({released[k].bond, 0.4 + 0.5 * static_cast<double>(random() % 1000) / 1000});
         problem.terms().restore_bonds(state);
-        released = problem.terms().released_energies(u);
+        released = problem.terms().released_energies({u, 0});
         double most = 0;
         for (const BondEnergy& b : released) most = std::max(most, std::abs(b.energy));
         Field force = problem.make_field();
@@ -160,11 +160,11 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
           changed[k].integrity = b;
           problem.terms().restore_bonds(changed);
           double energy = 0;
-          REQUIRE(problem.evaluate_forces(u, force, &energy).ok());
+          REQUIRE(problem.evaluate_forces({u, 0}, force, &energy).ok());
           return energy;
         };
         double whole = 0;
-        REQUIRE(problem.evaluate_forces(u, force, &whole).ok());
+        REQUIRE(problem.evaluate_forces({u, 0}, force, &whole).ok());
         constexpr double h = 1e-4;
         for (std::size_t n = 0; n < 6; ++n) {
           const std::size_t k = n * (state.size() - 1) / 5;
@@ -178,7 +178,7 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
         const Body& body = problem.body();
         problem.terms().restore_bonds({});
         std::vector<double> densities;
-        for (const BondEnergy& b : problem.terms().released_energies(u))
+        for (const BondEnergy& b : problem.terms().released_energies({u, 0}))
           densities.push_back(b.energy / (body.volume(static_cast<std::size_t>(b.bond.point)) * body.volume(static_cast<std::size_t>(b.bond.far))));
         std::ranges::sort(densities);
         // Between two of them: what is found from the forces that are there is the same but for rounding.
@@ -220,8 +220,8 @@ TEST_CASE("kinematics: bonds fail by the largest principal stress, that of the m
           const auto simulation = build(scene_text(options, kinematics_table(example)));
           stretch(simulation->problem());
           const std::size_t bonds =
-              simulation->problem().terms().bond_energies(simulation->problem().state().displacement()).size();
-          const BondUpdate update = simulation->problem().terms().update_bonds(simulation->problem().state().displacement());
+              simulation->problem().terms().bond_energies({simulation->problem().state().displacement(), 0}).size();
+          const BondUpdate update = simulation->problem().terms().update_bonds({simulation->problem().state().displacement(), 0});
           CHECK(update.changed == (share > 1 ? 0 : bonds));
         }
       }

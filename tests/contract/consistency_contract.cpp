@@ -161,8 +161,8 @@ TEST_CASE("kinematics: consistent clouds: force = -dE/du, tangent = dF/du, symme
         CHECK_MESSAGE(std::abs(slope + dot(body, f, w)) <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ",
                       slope);
         Field Kw = problem.make_field(), Kv = problem.make_field();
-        REQUIRE(problem.tangent_action(u, w, Kw).ok());
-        REQUIRE(problem.tangent_action(u, v, Kv).ok());
+        REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
+        REQUIRE(problem.tangent_action({u, 0}, v, Kv).ok());
         const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
         const double curvature =
             difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
@@ -170,7 +170,7 @@ TEST_CASE("kinematics: consistent clouds: force = -dE/du, tangent = dF/du, symme
         CHECK_MESSAGE(std::abs(dot(body, Kv, w) - dot(body, Kw, v)) <= 1e-12 * stiffness, "tangent is not symmetric");
         if (d == 3) continue;
         BlockMatrix K;
-        REQUIRE(problem.assemble_tangent(u, K).ok());
+        REQUIRE(problem.assemble_tangent({u, 0}, K).ok());
         double worst = 0;
         const auto size = static_cast<std::size_t>(d);
         for (std::size_t r = 0; r < K.rows(); ++r)

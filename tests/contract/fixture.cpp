@@ -176,7 +176,7 @@ void deform(const Body& body, FieldView u, std::uint64_t seed, double noise) {
 Field force_of(BodyProblem& problem, ConstFieldView u, double* energy) {
   Field f = problem.make_field();
   f.fill(std::numeric_limits<double>::quiet_NaN());
-  const EvaluationStatus status = problem.evaluate_forces(u, f, energy);
+  const EvaluationStatus status = problem.evaluate_forces({u, 0}, f, energy);
   if (!status.ok()) throw std::runtime_error(status.description);
   return f;
 }

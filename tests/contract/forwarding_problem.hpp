@@ -10,19 +10,19 @@ class ForwardingProblem : public Problem {
   explicit ForwardingProblem(Problem& of) : Problem(of), of_(of) {}
 
   void share(FieldView field) override { of_.share(field); }
-  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step) override {
-    return of_.evaluate_forces(u, force, energy, time_step);
+  EvaluationStatus evaluate_forces(const Configuration& at, FieldView force, double* energy) override {
+    return of_.evaluate_forces(at, force, energy);
   }
-  EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override {
-    return of_.external_forces(u, t, force);
+  EvaluationStatus external_forces(const Configuration& at, FieldView force) override {
+    return of_.external_forces(at, force);
   }
-  EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override {
-    return of_.add_load_stiffness(u, t, w, Kw);
+  EvaluationStatus add_load_stiffness(const Configuration& at, ConstFieldView w, FieldView Kw) override {
+    return of_.add_load_stiffness(at, w, Kw);
   }
-  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
-    return of_.tangent_action(u, w, Kw);
+  EvaluationStatus tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) override {
+    return of_.tangent_action(at, w, Kw);
   }
-  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override { return of_.assemble_tangent(u, K); }
+  EvaluationStatus assemble_tangent(const Configuration& at, BlockMatrix& K) override { return of_.assemble_tangent(at, K); }
   AssembledSize assembled_size() override { return of_.assembled_size(); }
   void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override { of_.assemble_companion(u, K, most_bulk); }
   std::unique_ptr<VolumetricPart> volumetric_part() override { return of_.volumetric_part(); }

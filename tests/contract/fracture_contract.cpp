@@ -66,7 +66,7 @@ struct Response {
 Response respond(BodyProblem& problem, std::uint64_t seed) {
   stretch_at_random(problem.body(), problem.state().displacement(), seed);
   Response r{0, problem.make_field()};
-  const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy);
+  const EvaluationStatus status = problem.evaluate_forces({problem.state().displacement(), 0}, r.force, &r.energy);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return r;
 }
@@ -84,10 +84,10 @@ double tangent_difference(BodyProblem& problem) {
   Field w = problem.make_field(), Kw = problem.make_field();
   Noise random(21);
   set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
-  REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
+  REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
   const double scale = largest(body, Kw);
   BlockMatrix K;
-  REQUIRE(problem.terms().assemble(problem.state().displacement(), K).ok());
+  REQUIRE(problem.terms().assemble({problem.state().displacement(), 0}, K).ok());
   const auto d = static_cast<std::size_t>(K.dimension);
   for (std::size_t r = 0; r < K.rows(); ++r)
     for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
@@ -110,7 +110,7 @@ double slope_error(BodyProblem& problem, const Response& r) {
   double energies[2] = {};
   for (const int side : {0, 1}) {
     for (std::size_t k = 0; k < u.size(); ++k) u.data[k] = kept.data()[k] + (side == 0 ? -h : h) * w.data()[k];
-    REQUIRE(problem.evaluate_forces(u, scratch, &energies[side]).ok());
+    REQUIRE(problem.evaluate_forces({u, 0}, scratch, &energies[side]).ok());
   }
   std::copy_n(kept.data(), u.size(), u.data);
   const double expected = -dot(problem.body(), r.force, w);
@@ -124,7 +124,7 @@ double affine_error(BodyProblem& problem) {
     return d == 1 ? Point{0.1 * x[0]} : Point{0.1 * x[0] - 0.07 * x[1], 0.03 * x[0] - 0.06 * x[1], d == 3 ? 0.05 * x[2] : 0.0};
   });
   PointSamples samples;
-  REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+  REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, samples).ok());
   const Field damage = problem.terms().damage();
   const double G[3][3] = {{0.1, -0.07, 0}, {0.03, -0.06, 0}, {0, 0, 0.05}};
   double worst = 0;
@@ -216,9 +216,9 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         CHECK(difference(body, before.force, plain.force) == 0);
         CHECK(before.energy == plain.energy);
         part_at(body, problem.state().displacement(), height);
-        const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
+        const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
         CHECK(2 * update.changed == cut->problem().terms().report().broken_bonds);
-        CHECK(problem.terms().update_bonds(problem.state().displacement()).changed == 0);
+        CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).changed == 0);
         const Response after = respond(problem, 6);
         const bool selective = formulation_of(example).selective();
         const std::optional<Response> expected = selective ? dense_response(*failing, height) : respond(cut->problem(), 6);
@@ -232,7 +232,7 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         for (const std::int32_t p : body.internal()) CHECK(std::abs(damage.data()[p] - cut_damage.data()[p]) <= 1e-12);
         // At rest again, and closed: nothing heals.
         set_field(body, problem.state().displacement(), [](const Point&) { return Point{}; });
-        CHECK(problem.terms().update_bonds(problem.state().displacement()).changed == 0);
+        CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).changed == 0);
         CHECK(problem.terms().changed_bonds().size() == update.changed);
       }
 }
@@ -254,7 +254,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         const auto intact = respond(problem, 11);
-        const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
+        const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
         CHECK(update.changed > 0);
         Response r = respond(problem, 11);
         CHECK(std::abs(intact.energy - r.energy - update.dissipated) <= 1e-11 * intact.energy);
@@ -463,7 +463,7 @@ TEST_CASE("kinematics: with the second law no bonds fail that would raise the en
               return Point{0.1 * random() - 0.02 * x[0], 0.1 * random() - 0.02 * x[1], 0.1 * random() - 0.02 * x[2]};
             });
             Response r{0, problem.make_field()};
-            REQUIRE(problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy).ok());
+            REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, r.force, &r.energy).ok());
             return r;
           };
           const auto plain = build(scene_text(options, kinematics_table(example)));
@@ -481,8 +481,8 @@ TEST_CASE("kinematics: with the second law no bonds fail that would raise the en
           BodyProblem& problem = lawful->problem();
           const Response intact = noise(problem);
           noise(lawless->problem());
-          const BondUpdate update = problem.terms().update_bonds(problem.state().displacement()),
-                           any = lawless->problem().terms().update_bonds(lawless->problem().state().displacement());
+          const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0}),
+                           any = lawless->problem().terms().update_bonds({lawless->problem().state().displacement(), 0});
           CHECK(update.dissipated >= 0);
           held += update.held;
           CHECK(any.held == 0);
@@ -493,7 +493,7 @@ TEST_CASE("kinematics: with the second law no bonds fail that would raise the en
           if (any.dissipated < 0) CHECK(update.held > 0);
           if (update.held == 0)
             CHECK(problem.terms().changed_bonds().size() == lawless->problem().terms().changed_bonds().size());
-          const BondUpdate again = problem.terms().update_bonds(problem.state().displacement());
+          const BondUpdate again = problem.terms().update_bonds({problem.state().displacement(), 0});
           CHECK(again.dissipated >= 0);
           CHECK((again.changed + again.held > 0) == (update.held > 0));
           // Bonds that were taken back are as if they had never been lowered.
@@ -530,7 +530,7 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
         const Body& body = problem.body();
         CHECK((body.lattice() != nullptr) == !cloud);   // lattices stay what they are
         const Response intact = respond(problem, 17);
-        const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
+        const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
         const BondChecks checks = problem.terms().bond_checks();
         CHECK(checks.weakened > 0);
         CHECK(checks.failed > 0);
@@ -571,7 +571,7 @@ TEST_CASE("kinematics: bonds fail under laws with history: released energy, mome
           if (stretch) stretch_at_random(of.body(), of.state().displacement(), seed);
           else deform(of.body(), of.state().displacement(), seed, 0.01);
           Response r{0, of.make_field()};
-          const EvaluationStatus status = of.evaluate_forces(of.state().displacement(), r.force, &r.energy, step);
+          const EvaluationStatus status = of.evaluate_forces({of.state().displacement(), 0, step}, r.force, &r.energy);
           REQUIRE_MESSAGE(status.ok(), status.description);
           return r;
         };
@@ -583,7 +583,7 @@ TEST_CASE("kinematics: bonds fail under laws with history: released energy, mome
         problem.advance(step);
         CHECK(problem.terms().changed_bonds().size() > before);
         Response left{0, problem.make_field()};
-        REQUIRE(problem.evaluate_forces(problem.state().displacement(), left.force, &left.energy).ok());
+        REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, left.force, &left.energy).ok());
         CHECK(std::abs(intact.energy - left.energy - (problem.state().energies.dissipated - dissipated)) <= 1e-11 * std::abs(intact.energy));
         for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
         other->problem().restore(problem.snapshot());
@@ -612,14 +612,14 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
           BodyProblem& problem = simulation->problem();
           const Body& body = problem.body();
           const Response intact = respond(problem, 13);
-          const BondUpdate update = problem.terms().update_bonds(problem.state().displacement());
+          const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
           const Response left = respond(problem, 13);
           // Bonds of fragments are accounted for like the others, and named once.
           CHECK(std::abs(intact.energy - left.energy - update.dissipated) <= 1e-11 * intact.energy);
           std::set<std::pair<std::int32_t, std::int32_t>> named;
           for (const BondChange& b : problem.terms().changed_bonds()) CHECK(named.emplace(b.bond.point, b.bond.far).second);
           CHECK(named.size() == update.changed);
-          CHECK(problem.terms().update_bonds(problem.state().displacement()).changed == 0);
+          CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).changed == 0);
           for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
           // No family is left near singular: 0.1 of an intact one, whose condition is below 20, in its weakest direction.
           const Field condition = problem.terms().shape_tensor_condition(), damage = problem.terms().damage();
@@ -651,7 +651,7 @@ TEST_CASE("kinematics: forces and energies that are renewed near failed bonds ar
         set_field(body, u, [&](const Point&) { return Point{0.02 * random(), 0.02 * random()}; });
         Field force = problem.make_field(), whole = problem.make_field();
         double energy = 0, of_whole = 0;
-        REQUIRE(problem.evaluate_forces(u, force, &energy).ok());
+        REQUIRE(problem.evaluate_forces({u, 0}, force, &energy).ok());
         const double before = energy;
         // One point at the middle of the body goes far from its neighbours.
         std::int32_t torn = body.internal().front();
@@ -662,11 +662,11 @@ TEST_CASE("kinematics: forces and energies that are renewed near failed bonds ar
         for (const std::int32_t p : body.internal())
           if (off(p) < off(torn)) torn = p;
         u.component(d - 1)[torn] += d == 1 ? 0.9 : 1.7;
-        const BondUpdate update = problem.terms().update_bonds(u);
+        const BondUpdate update = problem.terms().update_bonds({u, 0});
         CHECK(update.changed > 0);
         const std::vector<std::int32_t> moved{torn};
-        const EvaluationStatus renewed = problem.terms().renew_forces(u, moved, update.ends, force, &energy),
-                               anew = problem.evaluate_forces(u, whole, &of_whole);
+        const EvaluationStatus renewed = problem.terms().renew_forces({u, 0}, moved, update.ends, force, &energy),
+                               anew = problem.evaluate_forces({u, 0}, whole, &of_whole);
         REQUIRE(renewed.ok() == anew.ok());
         if (!anew.ok()) continue;
         CHECK(difference(body, force, whole) == 0);
@@ -680,8 +680,8 @@ TEST_CASE("kinematics: forces and energies that are renewed near failed bonds ar
         Field w = problem.make_field();
         set_field(body, w, [&](const Point&) { return Point{random(), random()}; });
         mask(part->inside(), w);
-        REQUIRE(part->tangent_action(u, w, force).ok());
-        REQUIRE(problem.tangent_action(u, w, whole).ok());
+        REQUIRE(part->tangent_action({u, 0}, w, force).ok());
+        REQUIRE(problem.tangent_action({u, 0}, w, whole).ok());
         mask(part->inside(), force);
         mask(part->inside(), whole);
         CHECK(norm(whole) > 0);
@@ -712,7 +712,7 @@ TEST_CASE("kinematics: stretches are those of bonds between neighbours that have
       // Half of the body flies away: no bond holds it.
       set_field(body, u, [](const Point& x) { return Point{x[0] < 4.5 ? 0.0 : 50.0, 0, 0}; });
       CHECK(problem.stretches(u).largest > 10);
-      CHECK(problem.terms().update_bonds(u).changed > 0);
+      CHECK(problem.terms().update_bonds({u, 0}).changed > 0);
       range(1, 1);
     }
 }
@@ -727,12 +727,12 @@ TEST_CASE("kinematics: points without bonds are free masses") {
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         set_field(body, problem.state().displacement(), [](const Point& x) { return Point{5 * x[0], 5 * x[1], 5 * x[2]}; });
-        CHECK(problem.terms().update_bonds(problem.state().displacement()).dissipated > 0);
+        CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).dissipated > 0);
         // Wherever they fly, even onto each other.
         set_field(body, problem.state().displacement(), [](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
         Field force = problem.body().make_field(d);
         double energy = 1;
-        REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy).ok());
+        REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, force, &energy).ok());
         CHECK(energy == 0);
         CHECK(largest(body, force) == 0);
         const Field damage = problem.terms().damage();
@@ -750,7 +750,7 @@ TEST_CASE("kinematics: a scene without damage pays nothing") {
       options.conditions = limit;
       const auto failing = build(scene_text(options, kinematics_table(example)));
       CHECK(plain->problem().terms().report().bytes < failing->problem().terms().report().bytes);
-      CHECK(plain->problem().terms().update_bonds(plain->problem().state().displacement()).changed == 0);
+      CHECK(plain->problem().terms().update_bonds({plain->problem().state().displacement(), 0}).changed == 0);
       CHECK(plain->problem().terms().bond_checks().updates == 0);
       CHECK(plain->problem().fracture_summary().empty());
     }

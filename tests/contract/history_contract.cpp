@@ -72,7 +72,7 @@ bool same(const BodyProblem& problem, const Response& a, const Response& b) {
 Response respond(BodyProblem& problem, ConstFieldView u, double time_step) {
   Response r{0, problem.make_field()};
   r.force.fill(std::numeric_limits<double>::quiet_NaN());
-  const EvaluationStatus status = problem.evaluate_forces(u, r.force, &r.energy, time_step);
+  const EvaluationStatus status = problem.evaluate_forces({u, 0, time_step}, r.force, &r.energy);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return r;
 }
@@ -120,8 +120,8 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
     PointSamples samples;
     const Response one = respond(problem, u, step), two = respond(problem, u, 0.0), three = respond(problem, u, step);
     CHECK_MESSAGE((same(problem, one, two) && same(problem, one, three)), "an evaluation depends on the one before");
-    REQUIRE(problem.tangent_action(u, w, Kw).ok());
-    REQUIRE(problem.terms().sample(u, samples).ok());
+    REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
+    REQUIRE(problem.terms().sample({u, 0}, samples).ok());
     CHECK_MESSAGE(kept(problem) == before, "an evaluation advanced the history");
     problem.advance(step);
     CHECK_MESSAGE(kept(problem) != before, "a step did not advance the history");
@@ -129,7 +129,7 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
     CHECK_MESSAGE(same(problem, respond(problem, u, 0.0), one),
                   "the state at the end of the step is not the one that was put aside");
     PointSamples after;
-    REQUIRE(problem.terms().sample(u, after).ok());
+    REQUIRE(problem.terms().sample({u, 0}, after).ok());
     double total = 0, scale = 0;
     for (const std::int32_t p : problem.body().internal()) {
       total += after.strain_energy_density.data()[p] * problem.body().volume(static_cast<std::size_t>(p));
@@ -165,7 +165,7 @@ TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's fo
     Field w = problem.make_field(), Kw = w;
     Noise random(36);
     set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
-    REQUIRE(problem.tangent_action(u, w, Kw).ok());
+    REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
     const double h = 5e-4 * problem.body().spacing();
     const auto force = [&](double by) {
       Field v = problem.make_field();
@@ -268,7 +268,7 @@ TEST_CASE("kinematics: rate laws leave out what no wave has reached, and not a b
           all->problem().advance(step);
         }
         CHECK(kept(some->problem()) == kept(all->problem()));
-        CHECK(some->problem().terms().resting_counts().quiet > 0);
-        CHECK(all->problem().terms().resting_counts().blocks == 0);
+        CHECK(some->problem().terms().report().resting.quiet > 0);
+        CHECK(all->problem().terms().report().resting.blocks == 0);
       }
 }

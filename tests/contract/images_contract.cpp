@@ -94,14 +94,14 @@ TEST_CASE("kinematics: between faces force = -dE/du and reaction = dE/dU, the ta
     const double slope = difference([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); });
     if (c.conservative()) CHECK_MESSAGE(std::abs(slope + dot(body, f, w)) <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ", slope);
     Field Kw = problem.make_field(), Kv = problem.make_field();
-    REQUIRE(problem.tangent_action(u, w, Kw).ok());
-    REQUIRE(problem.tangent_action(u, v, Kv).ok());
+    REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
+    REQUIRE(problem.tangent_action({u, 0}, v, Kv).ok());
     const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
     const double curvature = difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
     CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du: ", dot(body, Kw, v), " against ", curvature);
     if (c.conservative()) CHECK_MESSAGE(std::abs(dot(body, Kv, w) - dot(body, Kw, v)) <= 1e-12 * stiffness, "tangent is not symmetric");
     BlockMatrix K;
-    const EvaluationStatus status = problem.assemble_tangent(u, K);
+    const EvaluationStatus status = problem.assemble_tangent({u, 0}, K);
     REQUIRE_MESSAGE(status.ok(), status.description);
     const auto d = static_cast<std::size_t>(K.dimension);
     double worst = 0;
@@ -169,7 +169,7 @@ TEST_CASE("kinematics: a homogeneous stress between held faces of a lattice is i
       const FieldView u = problem.state().displacement();
       set_field(body, u, [&](const Point& x) { return Point{stretch[0] * x[0], stretch[1] * x[0], stretch[2] * x[0]}; });
       to_problem(problem, u);
-      REQUIRE(problem.evaluate_forces(u, problem.state().internal_force(), nullptr).ok());
+      REQUIRE(problem.evaluate_forces({u, 0}, problem.state().internal_force(), nullptr).ok());
       const ConstFieldView f = problem.state().internal_force();
       double out_of_balance = 0, largest_force = 0;
       for (const std::int32_t p : body.owned())

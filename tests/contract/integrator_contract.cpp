@@ -381,12 +381,12 @@ TEST_CASE("integrator: an evaluation leaves the initial displacement alone and s
       CHECK(displacement(*simulation) == before);
       Field force = problem.body().make_field(2);
       double energy = 0;
-      REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy).ok());
+      REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, force, &energy).ok());
       CHECK(problem.state().energies.strain == energy);
       CHECK(energy > 0);
       CHECK(std::equal(force.data(), force.data() + force.size(), problem.state().internal_force().data));
       PointSamples samples;
-      REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+      REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, samples).ok());
       double sum = 0;
       for (const std::int32_t p : problem.body().internal()) sum += samples.strain_energy_density.data()[p] * problem.body().volume(static_cast<std::size_t>(p));
       CHECK(std::abs(sum - energy) <= 1e-13 * energy);

@@ -69,8 +69,8 @@ TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
     if (conservative) CHECK_MESSAGE(mismatch <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ", slope);
     else CHECK_MESSAGE(mismatch > 1e-7 * scale, "declared as not conservative, but its force is -dE/du");
     Field Kw = poisoned(problem), Kv = poisoned(problem);
-    REQUIRE(problem.tangent_action(u, w, Kw).ok());
-    REQUIRE(problem.tangent_action(u, v, Kv).ok());
+    REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
+    REQUIRE(problem.tangent_action({u, 0}, v, Kv).ok());
     const double curvature = difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
     const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
     CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du: ", dot(body, Kw, v), " against ", curvature);
@@ -174,7 +174,7 @@ TEST_CASE("kinematics: affine motion is exact") {
       return v;
     });
     PointSamples samples;
-    REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+    REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, samples).ok());
     const bool gradients = problem.terms().has_gradients();   // a pair law has none, only energies
     const Field condition = problem.terms().shape_tensor_condition();
     double worst = 0, densities = 0, energy = energy_of(problem, problem.state().displacement());
@@ -330,8 +330,8 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), one), "savings change the result by ", worst / largest(problem.body(), one));
     const Field w = random_direction(problem, 52);
     Field Kw = poisoned(problem), expected = poisoned(problem);
-    REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
-    REQUIRE(plain->problem().tangent_action(problem.state().displacement(), w, expected).ok());
+    REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
+    REQUIRE(plain->problem().tangent_action({problem.state().displacement(), 0}, w, expected).ok());
     worst = 0;
     for (const std::int32_t p : problem.body().internal())
       for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(Kw.component(a)[p] - expected.component(a)[p]));
@@ -374,7 +374,7 @@ TEST_CASE("kinematics: samples that an evaluation of forces takes along are thos
       const Field force = force_of(problem, u, &energy);
       for (const Sampling asked : {Sampling::tensors, Sampling::energy, Sampling::von_mises}) {
         PointSamples alone{.asked = asked}, along{.asked = asked};
-        REQUIRE(problem.terms().sample(u, alone).ok());
+        REQUIRE(problem.terms().sample({u, 0}, alone).ok());
         problem.sample_along(asked);
         check_same(problem.body(), force_of(problem, u, &energy_along), force);
         CHECK(energy_along == energy);
@@ -387,7 +387,7 @@ TEST_CASE("kinematics: samples that an evaluation of forces takes along are thos
       deform(problem.body(), u, 22, 0.02);
       for (const Sampling asked : {Sampling::von_mises, Sampling::energy}) {
         PointSamples alone{.asked = asked}, later{.asked = asked};
-        REQUIRE(problem.terms().sample(u, alone).ok());
+        REQUIRE(problem.terms().sample({u, 0}, alone).ok());
         REQUIRE(problem.sample(later).ok());
         check_same(problem.body(), later, alone);
       }

@@ -64,7 +64,7 @@ TEST_CASE("kinematics: agrees with the dense reference") {
       const double expected_energy = reference::energy(op, saint_venant_kirchhoff(), u), scale = expected.cwiseAbs().maxCoeff();
       double energy = 0, worst = 0;
       Eigen::Index at = 0;
-      REQUIRE(problem.evaluate_forces(problem.state().displacement(), problem.state().internal_force(), &energy).ok());
+      REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, problem.state().internal_force(), &energy).ok());
       for (Eigen::Index i = 0; i < n; ++i)
         for (Eigen::Index c = 0; c < d; ++c) {
           const double error = std::abs(problem.state().internal_force().component(static_cast<int>(c))[body.internal()[static_cast<std::size_t>(i)]] - expected[d * i + c]);

@@ -65,8 +65,8 @@ TEST_CASE("kinematics: points that move as forces are evaluated") {
       Shift shift(u, du, force);
       shift.start();
       double energy = 0, energy_expected = 0;
-      REQUIRE(problem.move_and_evaluate_forces(shift, u, force, with_energy ? &energy : nullptr, 0).ok());
-      REQUIRE(problem.evaluate_forces(u, expected, with_energy ? &energy_expected : nullptr).ok());
+      REQUIRE(problem.evaluate_forces(Configuration(u, 0).moving(shift), force, with_energy ? &energy : nullptr).ok());
+      REQUIRE(problem.evaluate_forces({u, 0}, expected, with_energy ? &energy_expected : nullptr).ok());
       CHECK_MESSAGE(shift.each_once(), "not all points have moved, or some twice");
       bool same = energy == energy_expected;
       for (std::size_t k = 0; k < force.size(); ++k) same = same && force.data()[k] == expected.data()[k];

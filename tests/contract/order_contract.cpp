@@ -58,8 +58,8 @@ TEST_CASE("kinematics: order 8 is in the operator, with the forces and the tange
       CHECK(std::abs(difference([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); }) + dot(body, f, w)) <=
             1e-7 * scale);
       Field Kw = problem.make_field(), Kv = problem.make_field();
-      REQUIRE(problem.tangent_action(u, w, Kw).ok());
-      REQUIRE(problem.tangent_action(u, v, Kv).ok());
+      REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
+      REQUIRE(problem.tangent_action({u, 0}, v, Kv).ok());
       const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
       const double curvature = difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
       CHECK(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness);

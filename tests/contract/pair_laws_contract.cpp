@@ -44,7 +44,7 @@ Field densities(Simulation& simulation, const Point& H) {
   BodyProblem& problem = simulation.problem();
   set_field(problem.body(), problem.state().displacement(), [&](const Point& x) { return Point{H[0] * x[0], H[1] * x[1], H[2] * x[2]}; });
   PointSamples samples;
-  REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+  REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, samples).ok());
   return samples.strain_energy_density;
 }
 
@@ -76,7 +76,7 @@ TEST_CASE("kinematics: pair laws agree with the dense reference") {
             const reference::Cloud cloud_of_body = cloud_of(body, *influence);
             Field f = problem.body().make_field(d);
             double energy = 0;
-            REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, &energy).ok());
+            REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, f, &energy).ok());
             const reference::Vector expected = reference::pair_force(cloud_of_body, law.part, elasticity(body), u);
             const double expected_energy = reference::pair_energy(cloud_of_body, law.part, elasticity(body), u);
             const double worst = (dense(body, f) - expected).cwiseAbs().maxCoeff();
@@ -245,7 +245,7 @@ TEST_CASE("kinematics: a pair law reports points on top of each other") {
       const Point x = body.position(p), y = body.position(q);
       for (int c = 0; c < 2; ++c) problem.state().displacement().component(c)[q] = x[static_cast<std::size_t>(c)] - y[static_cast<std::size_t>(c)];
       Field f = problem.body().make_field(2);
-      const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), f, nullptr);
+      const EvaluationStatus status = problem.evaluate_forces({problem.state().displacement(), 0}, f, nullptr);
       CHECK(!status.ok());
       CHECK(status.description.find("non-finite length") != std::string::npos);
     }

@@ -87,7 +87,7 @@ double unbalanced(BodyProblem& problem, double& reaction) {
   reaction = std::max(reaction, largest(problem.body(), reactions(problem, false, problem.state().time)));
   double most = 0;
   Field force = problem.body().make_field(2);
-  REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, nullptr).ok());
+  REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, force, nullptr).ok());
   for (std::size_t k = 0; k < free.size(); ++k)
     if (free.data[k] == 1.0) most = std::max(most, std::abs(force.data()[k]));
   return most / reaction;

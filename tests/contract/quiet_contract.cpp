@@ -50,7 +50,7 @@ class Pair {
     for (int k = 0; k < 2; ++k) {
       force[k] = problems[k]->make_field();
       force[k].fill(std::numeric_limits<double>::quiet_NaN());
-      const EvaluationStatus status = problems[k]->evaluate_forces(u, force[k], &energy[k]);
+      const EvaluationStatus status = problems[k]->evaluate_forces({u, 0}, force[k], &energy[k]);
       REQUIRE_MESSAGE(status.ok(), status.description);
     }
     bool same = energy[0] == energy[1];
@@ -77,20 +77,20 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     pair.compare(rest, "at rest");
     pair.compare(left, "with one end moving");
     pair.compare(right, "with the other end moving");
-    const RestingCounts before = pair.some().terms().resting_counts();
+    const RestingCounts before = pair.some().terms().report().resting;
     for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
       Field Kw = problem->make_field();
-      REQUIRE(problem->tangent_action(right, left, Kw).ok());
+      REQUIRE(problem->tangent_action({right, 0}, left, Kw).ok());
     }
     pair.compare(left, "after a tangent action");
     for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
       PointSamples samples;
-      REQUIRE(problem->terms().sample(right, samples).ok());
+      REQUIRE(problem->terms().sample({right, 0}, samples).ok());
     }
     pair.compare(right, "after a sample");
     pair.compare(rest, "back at rest");
-    const RestingCounts after = pair.some().terms().resting_counts();
-    CHECK(pair.all().terms().resting_counts().blocks == 0);
+    const RestingCounts after = pair.some().terms().report().resting;
+    CHECK(pair.all().terms().report().resting.blocks == 0);
     if (!c.conservative()) continue;
     const std::int64_t blocks = after.blocks - before.blocks, quiet = after.quiet - before.quiet;
     CHECK(blocks > 0);

@@ -21,8 +21,8 @@ struct Result {
 /// Forces, energy and tangent action of the problem's displacement.
 Result evaluate(BodyProblem& problem, ConstFieldView w) {
   Result r{problem.make_field(), problem.make_field()};
-  REQUIRE(problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy).ok());
-  REQUIRE(problem.tangent_action(problem.state().displacement(), w, r.stiffness).ok());
+  REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, r.force, &r.energy).ok());
+  REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, r.stiffness).ok());
   return r;
 }
 
@@ -84,7 +84,7 @@ TEST_CASE("stabilization: a sawtooth, which the point gradient does not see, sto
           });
           Field f = problem.body().make_field(d);
           double sum = 0;
-          REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, &sum).ok());
+          REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, f, &sum).ok());
           return sum;
         };
         // Surfaces and jitter make the plain gradient see a little of it.
@@ -112,8 +112,8 @@ TEST_CASE("stabilization: horizons of more cells than the lattice kernels buffer
       const auto energy = [&](double step) {
         for (std::size_t k = 0; k < u.size(); ++k) plain->problem().state().displacement().data[k] = with->problem().state().displacement().data[k] = u.data()[k] + step * w.data()[k];
         double base = 0, sum = 0;
-        REQUIRE(plain->problem().evaluate_forces(plain->problem().state().displacement(), plain->problem().state().internal_force(), &base).ok());
-        REQUIRE(with->problem().evaluate_forces(with->problem().state().displacement(), with->problem().state().internal_force(), &sum).ok());
+        REQUIRE(plain->problem().evaluate_forces({plain->problem().state().displacement(), 0}, plain->problem().state().internal_force(), &base).ok());
+        REQUIRE(with->problem().evaluate_forces({with->problem().state().displacement(), 0}, with->problem().state().internal_force(), &sum).ok());
         scale = std::max(scale, sum);
         return sum - base;
       };

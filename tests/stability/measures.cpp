@@ -73,7 +73,7 @@ Eigen::MatrixXd rigid_motions(const Eigen::MatrixXd& x, int d) {
 Eigen::MatrixXd dense_tangent(BodyProblem& problem) {
   BlockMatrix K;
   Field rest = problem.make_field();
-  if (!problem.assemble_tangent(rest, K).ok()) throw RunError("no tangent at rest");
+  if (!problem.assemble_tangent({rest, 0}, K).ok()) throw RunError("no tangent at rest");
   const auto d = static_cast<Eigen::Index>(K.dimension);
   const auto mass = problem.masses().by_point();
   // Block rows are in the order of field indices; positions in input order.
@@ -218,7 +218,7 @@ Accuracy Specimen::accuracy() {
       return v;
     });
     PointSamples samples;
-    if (!problem.terms().sample(u, samples).ok()) throw RunError("inadmissible test field");
+    if (!problem.terms().sample({u, 0}, samples).ok()) throw RunError("inadmissible test field");
     double most = 0, centre = 0, nearest = std::numeric_limits<double>::infinity();
     for (const std::int32_t index : body.internal()) {
       const Point x = body.position(static_cast<std::size_t>(index));

@@ -1,5 +1,5 @@
 /// A term that no other file knows: springs that hold every point where it was, stiffer the farther it has gone. It is part of
-/// energies, forces, tangent actions, assembled tangents, samples, and of equilibria, with bonds that fail, too.
+/// energies, forces, tangent actions, assembled tangents, and of equilibria, with bonds that fail, too.
 
 #include <doctest/doctest.h>
 
@@ -19,69 +19,35 @@ namespace {
 
 constexpr double stiffness = 0.3, length = 0.5;  // k [N/m^4], and how far a spring goes until it is twice as stiff
 
-/// Adds its blocks to the diagonal.
-class FoundationAssembly final : public Assembly {
- public:
-  explicit FoundationAssembly(const BlockRows& rows) : rows_(rows) {}
-  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
-  void bonds_changed() override {}
-  std::size_t bytes() const noexcept override { return 0; }
-
- private:
-  const BlockRows& rows_;
-};
-
 /// E = sum_i V_i k (|u_i|^2 / 2 + |u_i|^4 / (4 l^2)).
 class Foundation final : public Term {
  public:
   explicit Foundation(const TermParts& parts) : body_(parts.families->body()) {}
 
-  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) override {
+  std::int64_t forces(const Configuration& at, const Region&, const ForceSum& sum) override {
+    const ConstFieldView u = at.u();
     for (const std::int32_t p : body_.internal()) {
       const double k = stiffness * body_.volume(static_cast<std::size_t>(p)), square = square_of(u, p);
-      for (int c = 0; c < u.components; ++c) force.component(c)[p] -= k * (1 + square / (length * length)) * u.component(c)[p];
-      if (energy) energy->add(k * (square / 2 + square * square / (4 * length * length)));
+      for (int c = 0; c < u.components; ++c) sum.force.component(c)[p] -= k * (1 + square / (length * length)) * u.component(c)[p];
+      if (sum.wants_stored()) sum.energies[static_cast<std::size_t>(p) / padding].stored += k * (square / 2 + square * square / (4 * length * length));
     }
     return -1;
   }
-  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+  std::int64_t tangent(const Configuration& at, ConstFieldView w, const Region&, FieldView Kw) override {
+    const ConstFieldView u = at.u();
     for (const std::int32_t p : body_.internal())
       for (int c = 0; c < u.components; ++c)
         for (int e = 0; e < u.components; ++e) Kw.component(c)[p] += body_.volume(static_cast<std::size_t>(p)) * entry(u, p, c, e) * w.component(e)[p];
     return -1;
   }
-  std::int64_t add_samples(ConstFieldView u, PointSamples& samples) override {
-    for (const std::int32_t p : body_.internal()) {
-      const double square = square_of(u, p);
-      samples.strain_energy_density.data()[p] += stiffness * (square / 2 + square * square / (4 * length * length));
-    }
-    return -1;
-  }
-  int coupling_reach() const noexcept override { return 1; }
-  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override { return std::make_unique<FoundationAssembly>(rows); }
-  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum* energy) override {
-    return add_forces(u, force, energy);
-  }
-  std::int64_t renew_forces(ConstFieldView u, const GroupMarks&, const GroupMarks&, const GroupMarks&, FieldView force, ExactSum& energy) override {
-    return add_forces(u, force, &energy);
-  }
-  std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks&, const GroupMarks&, FieldView Kw) override {
-    return add_tangent(u, w, Kw);
-  }
-  void add_bonds(ConstFieldView, const GroupMarks&, const GroupMarks&, BondSamples&) override {}
-  void bonds_changed(std::span<const std::int32_t>) override {}
-  const NearestFailure* watch(const BodyDamage&) override { return nullptr; }
-  bool screen(BondScreen*) override { return false; }
   void report(ModelReport& report) const override { report.notes.emplace_back("foundation", "springs at all points"); }
-  RestingCounts resting_counts() const noexcept override { return {}; }
 
+ private:
   /// d2E/du_c du_e of a unit of volume.
   static double entry(ConstFieldView u, std::int32_t p, int c, int e) {
     const double along = 2 * u.component(c)[p] * u.component(e)[p] / (length * length);
     return stiffness * ((c == e ? 1 + square_of(u, p) / (length * length) : 0.0) + along);
   }
-
- private:
   static double square_of(ConstFieldView u, std::int32_t p) {
     double square = 0;
     for (int c = 0; c < u.components; ++c) square += u.component(c)[p] * u.component(c)[p];
@@ -90,17 +56,6 @@ class Foundation final : public Term {
 
   const Body& body_;
 };
-
-std::int64_t FoundationAssembly::add(ConstFieldView u, BlockMatrix& K) {
-  const auto d = static_cast<std::size_t>(u.components);
-  for (std::size_t r = 0; r < rows_.size(); ++r)
-    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-      for (std::size_t c = 0; c < d && K.column[b] == static_cast<std::int32_t>(r); ++c)
-        for (std::size_t e = 0; e < d; ++e)
-          K.values[(b * d + c) * d + e] +=
-              rows_.volume(r) * Foundation::entry(u, static_cast<std::int32_t>(rows_.point(r)), static_cast<int>(c), static_cast<int>(e));
-  return -1;
-}
 
 Registry& parts() {
   static Registry registry;
@@ -159,13 +114,13 @@ TEST_CASE("a further term: force = -dE/du, tangent = dF/du, the same assembled, 
       Field moved = problem->make_field();
       combine(1, u, s, w, moved);
       double energy = 0;
-      REQUIRE(problem->evaluate_forces(moved, force, &energy).ok());
+      REQUIRE(problem->evaluate_forces({moved, 0}, force, &energy).ok());
       return energy;
     };
     const double slope = (8 * (at(h, other) - at(-h, other)) - (at(2 * h, other) - at(-2 * h, other))) / (12 * h);
     at(0, f);
     CHECK(std::abs(slope + product(*problem, f, w)) <= 1e-8 * std::abs(slope));
-    REQUIRE(problem->tangent_action(u, w, Kw).ok());
+    REQUIRE(problem->tangent_action({u, 0}, w, Kw).ok());
     const auto along = [&](double s) {
       at(s, other);
       return -product(*problem, other, w);
@@ -173,7 +128,7 @@ TEST_CASE("a further term: force = -dE/du, tangent = dF/du, the same assembled, 
     const double curvature = (8 * (along(h) - along(-h)) - (along(2 * h) - along(-2 * h))) / (12 * h);
     CHECK(std::abs(curvature - product(*problem, Kw, w)) <= 1e-7 * std::abs(curvature));
     BlockMatrix K;
-    REQUIRE(problem->assemble_tangent(u, K).ok());
+    REQUIRE(problem->assemble_tangent({u, 0}, K).ok());
     double worst = 0, most = 0;
     for (std::size_t r = 0; r < K.rows(); ++r)
       for (std::size_t a = 0; a < 2; ++a) {
@@ -212,9 +167,9 @@ TEST_CASE("a further term: the account of energies holds where bonds fail") {
   fill(*problem, u, 0.1);
   copy(u, problem->state().displacement());
   double before = 0, after = 0;
-  REQUIRE(problem->evaluate_forces(u, f, &before).ok());
-  const BondUpdate update = problem->terms().update_bonds(u);
+  REQUIRE(problem->evaluate_forces({u, 0}, f, &before).ok());
+  const BondUpdate update = problem->terms().update_bonds({u, 0});
   REQUIRE(update.changed > 0);
-  REQUIRE(problem->evaluate_forces(u, f, &after).ok());
+  REQUIRE(problem->evaluate_forces({u, 0}, f, &after).ok());
   CHECK(std::abs(before - after - update.dissipated) <= 1e-12 * before);
 }

@@ -93,7 +93,7 @@ class Bar {
     BodyProblem& problem = simulation->problem();
     Field force = problem.make_field();
     double energy = 0;
-    REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy, 0).ok());
+    REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0, 0}, force, &energy).ok());
     double volume = 1, largest = 0;
     for (const int n : cells_) volume *= n;
     const ConstFieldView free = problem.constraints().free();
@@ -149,7 +149,7 @@ TEST_CASE("a traction on nodes of a side keeps the bar in equilibrium, beside a 
         BodyProblem& problem = simulation->problem();
         Field force = problem.make_field(), load = problem.make_field();
         double energy = 0, largest = 0, work = 0;
-        REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy, 0).ok());
+        REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0, 0}, force, &energy).ok());
         problem.loads().evaluate(0, load);
         const ConstFieldView free = problem.constraints().free();
         for (const std::int32_t p : problem.body().owned()) {
@@ -208,7 +208,7 @@ TEST_CASE("curved surfaces with points on them: a ring between two held surfaces
   BodyProblem& problem = simulation.problem();
   Field force = problem.make_field();
   double energy = 0;
-  REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy, 0).ok());
+  REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0, 0}, force, &energy).ok());
   CHECK(energy == doctest::Approx(0.5 * 1e-4 * 3 * M_PI).epsilon(1e-6));
   double largest = 0;
   const ConstFieldView free = problem.constraints().free();

@@ -104,7 +104,7 @@ Outcome evaluate(const Case& of, const Bonds& in, std::vector<MaterialRecord> re
   for (std::size_t g = 0; g < std::size(s.volume_group); ++g) s.volume_group[g] = static_cast<std::int64_t>(g * padding);
   s.owner_volumes = {s.volume, batch_points, s.volume_group, of.whole};
   BondScreen screen;
-  const BatchWork work(laws, of.work, true, true, nullptr, nullptr, of.work == Work::force ? &screen : nullptr);
+  const BatchWork work(laws, {.work = of.work, .energy = true, .selective = true, .screen = of.work == Work::force ? &screen : nullptr});
   GroupEnergy energy;
   Outcome out;
   out.bad = work.evaluate(bonds, s, of.ends == 2, &energy);

@@ -89,10 +89,10 @@ TEST_CASE("bond Jacobian: what weakening bonds add to the tangent is the derivat
           }
         const auto bonds = problem.weakening_bonds();
         REQUIRE(bonds != nullptr);
-        REQUIRE(problem.evaluate_forces(u, problem.state().internal_force(), nullptr).ok());
+        REQUIRE(problem.evaluate_forces({u, 0}, problem.state().internal_force(), nullptr).ok());
         REQUIRE(problem.advance(0));
         CHECK_FALSE(bonds->any());  // nothing is known of their falls in the first round
-        REQUIRE(bonds->add_tangent(u, w, Kw).ok());
+        REQUIRE(bonds->add_tangent({u, 0}, w, Kw).ok());
         const std::vector<BondChange> weakened = problem.terms().changed_bonds();
         REQUIRE(weakened.size() > 5);
         constexpr double step = 1e-5;
@@ -104,7 +104,7 @@ TEST_CASE("bond Jacobian: what weakening bonds add to the tangent is the derivat
             follow.push_back({b.bond, b.integrity > 0 ? left_at(stretch(body, at, b.bond), onset, failure, beta) : 0.0});
           }
           problem.terms().restore_bonds(follow);
-          REQUIRE(problem.evaluate_forces(u, sign > 0 ? ahead : behind, nullptr).ok());
+          REQUIRE(problem.evaluate_forces({u, 0}, sign > 0 ? ahead : behind, nullptr).ok());
         }
         Field difference = problem.make_field();
         combine(-0.5 / step, ahead, 0.5 / step, behind, difference);

@@ -23,7 +23,7 @@ double stiffness_error(const std::string& kinematics, bool consistent, double ji
   contract::run(*simulation);
   BodyProblem& problem = simulation->problem();
   Field reaction = problem.make_field();
-  REQUIRE(problem.evaluate_forces(problem.state().displacement(), reaction, nullptr).ok());
+  REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, reaction, nullptr).ok());
   for (double& f : std::span(reaction.data(), reaction.size())) f = -f;
   for (std::size_t k = 0; k < reaction.size(); ++k)
     if (problem.constraints().free().data[k] != 0) reaction.data()[k] = 0;

@@ -56,7 +56,7 @@ std::string rubber(double bulk) {
 double volume_change(Simulation& simulation) {
   const auto points = build(block("type = \"conventional\"", rubber(1.0), "[0, 0]", "[0, 0]", 1));
   PointSamples samples;
-  REQUIRE(points->problem().terms().sample(simulation.problem().state().displacement(), samples).ok());
+  REQUIRE(points->problem().terms().sample({simulation.problem().state().displacement(), 0}, samples).ok());
   double most = 0;
   for (const std::int32_t p : points->problem().body().internal()) {
     const auto H = [&](int c) { return samples.H.component(c)[p]; };
@@ -315,7 +315,7 @@ double far_energy(double offset, double scale, double jitter, std::string* summa
   run(*simulation);
   double energy = 0;
   Field force = simulation->problem().make_field();
-  REQUIRE(simulation->problem().evaluate_forces(simulation->problem().state().displacement(), force, &energy).ok());
+  REQUIRE(simulation->problem().evaluate_forces({simulation->problem().state().displacement(), 0}, force, &energy).ok());
   return energy / (scale * scale * scale);
 }
 

@@ -45,7 +45,7 @@ void check_state(const std::string& scene, std::vector<std::string> overrides, c
   const auto simulation = load(scene, overrides);
   BodyProblem& problem = simulation->problem();
   PointSamples samples;
-  const EvaluationStatus status = problem.terms().sample(problem.state().displacement(), samples);
+  const EvaluationStatus status = problem.terms().sample({problem.state().displacement(), 0}, samples);
   REQUIRE_MESSAGE(status.ok(), status.description);
   double worst_P = 0, worst_sigma = 0, worst_psi = 0;
   for (const std::int32_t p : problem.body().internal()) {

@@ -88,7 +88,7 @@ TEST_CASE("convex tangents: no negative curvature, and the exact one where there
     const auto assembled = [&](bool convex) {
       BlockMatrix K;
       K.convex = convex;
-      REQUIRE(problem.assemble_tangent(u, K).ok());
+      REQUIRE(problem.assemble_tangent({u, 0}, K).ok());
       Eigen::MatrixXd dense =
           Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(2 * K.rows()), static_cast<Eigen::Index>(2 * K.rows()));
       for (std::size_t r = 0; r < K.rows(); ++r)

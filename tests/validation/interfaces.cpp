@@ -68,7 +68,7 @@ TEST_CASE("interfaces: the force of a bar of a pair law with a dilatation is tha
     double energy = 0;
     BodyProblem& problem = simulation->problem();
     Field out = problem.make_field();
-    REQUIRE(problem.evaluate_forces(problem.state().displacement(), out, &energy).ok());
+    REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, out, &energy).ok());
     return energy;
   };
   // The law's own error, 8 % with 20 points, is that of a bar of one material; with one half ten times as stiff it stores 1/(1/2 + 1/20) times as much.
@@ -95,7 +95,7 @@ TEST_CASE("interfaces: layers along the load are as stiff as side by side") {
     double energy = 0;
     BodyProblem& problem = simulation->problem();
     Field force = problem.make_field();
-    REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, &energy).ok());
+    REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, force, &energy).ok());
     return energy;
   };
   CHECK(energy(true) == doctest::Approx(energy(false)).epsilon(1e-12));

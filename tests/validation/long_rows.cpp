@@ -37,8 +37,8 @@ Forces forces_of(int dimension, int length, int width, double jitter, const std:
   BodyProblem& problem = simulation.problem();
   Forces result;
   Field f = problem.body().make_field(dimension), Kw = problem.body().make_field(dimension);
-  REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, &result.energy).ok());
-  REQUIRE(problem.tangent_action(problem.state().displacement(), problem.state().displacement(), Kw).ok());
+  REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, f, &result.energy).ok());
+  REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, problem.state().displacement(), Kw).ok());
   const auto in_input_order = [&](const Field& field, std::vector<double>& out) {
     for (std::size_t i = 0; i < problem.body().points(); ++i)
       for (int c = 0; c < dimension; ++c) out.push_back(field.component(c)[static_cast<std::size_t>(problem.body().internal()[i])]);

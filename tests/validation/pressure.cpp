@@ -47,8 +47,8 @@ double imbalance(Simulation& simulation, double stretch, double pressure) {
   for (const std::int32_t p : problem.body().owned())
     for (int c = 0; c < d; ++c)
       u.component(c)[p] = (stretch - 1) * problem.body().position(static_cast<std::size_t>(p))[static_cast<std::size_t>(c)];
-  REQUIRE(problem.evaluate_forces(u, force, nullptr).ok());
-  REQUIRE(problem.external_forces(u, 1.0, external).ok());
+  REQUIRE(problem.evaluate_forces({u, 0}, force, nullptr).ok());
+  REQUIRE(problem.external_forces({u, 1.0}, external).ok());
   double largest = 0, left = 0;
   for (const std::int32_t p : problem.body().owned())
     for (int c = 0; c < d; ++c) {
@@ -164,13 +164,13 @@ TEST_CASE("the stiffness of a pressure that follows is its derivative") {
     w.component(0)[p] = std::cos(2 * x[0]);
     w.component(1)[p] = x[1] * x[1];
   }
-  REQUIRE(problem.add_load_stiffness(u, 1.0, w, Kw).ok());
+  REQUIRE(problem.add_load_stiffness({u, 1.0}, w, Kw).ok());
   const double h = 0.01;  // the force is quadratic in u: no error of the differences but rounding
   Field moved = problem.make_field();
   combine(1, u, h, w, moved);
-  REQUIRE(problem.external_forces(moved, 1.0, plus).ok());
+  REQUIRE(problem.external_forces({moved, 1.0}, plus).ok());
   combine(1, u, -h, w, moved);
-  REQUIRE(problem.external_forces(moved, 1.0, minus).ok());
+  REQUIRE(problem.external_forces({moved, 1.0}, minus).ok());
   combine(1 / (2 * h), minus, -1 / (2 * h), plus, plus);
   combine(1, plus, -1, Kw, moved);
   CHECK(norm(moved) < 1e-9 * norm(Kw));

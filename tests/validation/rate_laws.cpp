@@ -37,7 +37,7 @@ TEST_CASE("simple shear of a rate law: stress and work of the closed form, under
     contract::run(*simulation);
     BodyProblem& problem = simulation->problem();
     PointSamples samples;
-    REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+    REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, samples).ok());
     double worst = 0;
     for (const std::int32_t p : problem.body().internal()) {
       worst = std::max({worst, std::abs(samples.cauchy.component(0)[p] - expected.xx),

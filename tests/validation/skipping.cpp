@@ -184,9 +184,9 @@ TEST_CASE("skipping: points that no wave has reached are not evaluated, and the 
       Run some = run("true"), every = run("false");
       const std::vector<double> end = some.end(), expected = every.end();
       CHECK(end == expected);
-      const RestingCounts quiet = some.problem().terms().resting_counts();
+      const RestingCounts quiet = some.problem().terms().report().resting;
       CHECK_MESSAGE(quiet.quiet > quiet.blocks / 4, quiet.quiet, " of ", quiet.blocks, " blocks left out");
-      CHECK(every.problem().terms().resting_counts().blocks == 0);
+      CHECK(every.problem().terms().report().resting.blocks == 0);
       if (kinematics != "ordinary")
         CHECK_MESSAGE(some.counting.work.stresses < 0.75 * static_cast<double>(every.counting.work.stresses), some.counting.work.stresses.load(), " of ",
                       every.counting.work.stresses.load(), " evaluation points");
@@ -299,7 +299,7 @@ TEST_CASE("skipping: points held at rest have no forces beyond the reach of free
     const FieldView force = some.problem().state().internal_force(), same = every.problem().state().internal_force();
     CHECK(std::equal(force.data, force.data + force.size(), same.data));
     CHECK(some.problem().constraints().points_held_at_rest() == 3000);
-    const RestingCounts quiet = some.problem().terms().resting_counts();
+    const RestingCounts quiet = some.problem().terms().report().resting;
     CHECK_MESSAGE(2 * quiet.quiet > quiet.blocks, quiet.quiet, " of ", quiet.blocks, " blocks left out");
     CHECK(some.simulation->explanation(registry()).find("points held at rest: no wave ever reaches them") != std::string::npos);
   }

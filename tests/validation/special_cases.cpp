@@ -24,7 +24,7 @@ struct Response {
 
 Response respond(BodyProblem& problem) {
   Response r{0, problem.make_field()};
-  const EvaluationStatus status = problem.evaluate_forces(problem.state().displacement(), r.force, &r.energy);
+  const EvaluationStatus status = problem.evaluate_forces({problem.state().displacement(), 0}, r.force, &r.energy);
   REQUIRE_MESSAGE(status.ok(), status.description);
   return r;
 }
@@ -93,8 +93,8 @@ TEST_CASE("projection with weight = \"kernel\" and baqp coincide where the point
     const auto one = run("{ type = \"projection\", weight = \"kernel\" }"), two = run("{ type = \"baqp\" }");
     const Response r = respond(one->problem()), s = respond(two->problem());
     PointSamples a, b;
-    REQUIRE(one->problem().terms().sample(one->problem().state().displacement(), a).ok());
-    REQUIRE(two->problem().terms().sample(two->problem().state().displacement(), b).ok());
+    REQUIRE(one->problem().terms().sample({one->problem().state().displacement(), 0}, a).ok());
+    REQUIRE(two->problem().terms().sample({two->problem().state().displacement(), 0}, b).ok());
     const std::int32_t p = two->problem().body().set("inside").front();
     const double density = b.strain_energy_density.data()[p];
     CHECK(std::abs(a.strain_energy_density.data()[p] - density) <= 1e-12 * density);
@@ -128,8 +128,8 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       const Body& body = problem.body();
       REQUIRE(problem.terms().report().singular_families == 4);
       PointSamples a, b;
-      REQUIRE(plain->problem().terms().sample(plain->problem().state().displacement(), a).ok());
-      REQUIRE(problem.terms().sample(problem.state().displacement(), b).ok());
+      REQUIRE(plain->problem().terms().sample({plain->problem().state().displacement(), 0}, a).ok());
+      REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, b).ok());
       const Field condition = problem.terms().shape_tensor_condition();
       int same = 0, different = 0;
       for (const std::int32_t p : body.internal()) {
@@ -143,12 +143,12 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       Field w = problem.body().make_field(2), f = problem.body().make_field(2), scratch = problem.body().make_field(2);
       contract::Noise random(62);
       contract::set_field(body, w, [&](const Point&) { return Point{random(), random(), 0}; });
-      REQUIRE(problem.evaluate_forces(problem.state().displacement(), f, nullptr).ok());
+      REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, f, nullptr).ok());
       const auto energy = [&](double h) {
         Field u = problem.body().make_field(2);
         for (std::size_t k = 0; k < u.size(); ++k) u.data()[k] = problem.state().displacement().data[k] + h * w.data()[k];
         double value = 0;
-        REQUIRE(problem.evaluate_forces(u, scratch, &value).ok());
+        REQUIRE(problem.evaluate_forces({u, 0}, scratch, &value).ok());
         return value;
       };
       const double h = 2e-3, slope = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h);
@@ -156,8 +156,8 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       // The assembled tangent knows these owners too.
       Field Kw = problem.body().make_field(2);
       BlockMatrix K;
-      REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
-      REQUIRE(problem.assemble_tangent(problem.state().displacement(), K).ok());
+      REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
+      REQUIRE(problem.assemble_tangent({problem.state().displacement(), 0}, K).ok());
       double worst = 0;
       for (std::size_t r = 0; r < K.rows(); ++r)
         for (int a = 0; a < 2; ++a) {

@@ -56,7 +56,7 @@ TEST_CASE("traction bar: tractions on both faces leave a homogeneous stress, for
         for (std::size_t c = 0; c < 3; ++c) problem.state().displacement().component(static_cast<int>(c))[p] = (c == 0 ? strain : -across) * x[c];
       }
       Field force = problem.body().make_field(3);
-      REQUIRE(problem.evaluate_forces(problem.state().displacement(), force, nullptr).ok());
+      REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, force, nullptr).ok());
       problem.loads().evaluate(1.0, problem.state().external_force());
       double most = 0, off = 0;
       for (std::size_t k = 0; k < force.size(); ++k) {

@@ -26,7 +26,7 @@ Sample sample(const std::string& scene, const std::string& set, std::vector<std:
   const auto simulation = load(scene, std::move(overrides));
   BodyProblem& problem = simulation->problem();
   PointSamples samples;
-  const EvaluationStatus status = problem.terms().sample(problem.state().displacement(), samples);
+  const EvaluationStatus status = problem.terms().sample({problem.state().displacement(), 0}, samples);
   REQUIRE_MESSAGE(status.ok(), status.description);
   const std::vector<std::int32_t>& points = problem.body().set(set);
   REQUIRE(points.size() == 1);
@@ -172,7 +172,7 @@ TEST_CASE("spectrum: the energy of short waves vanishes for conventional alone")
     const auto simulation = load("chowdhury/spectrum.toml", {kinematics, fmt::format("constants.k={}", k), "body.lattice.spacing=0.002", "body.line=strain"});
     BodyProblem& problem = simulation->problem();
     PointSamples samples;
-    REQUIRE(problem.terms().sample(problem.state().displacement(), samples).ok());
+    REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, samples).ok());
     double sum = 0;
     for (const std::int32_t p : problem.body().set("inside")) sum += samples.strain_energy_density.data()[p];
     return sum;

@@ -8,6 +8,7 @@
 #include "assembly/block_rows.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/parallel.hpp"
+#include "perikit/model/configuration.hpp"
 
 namespace perikit {
 
@@ -17,7 +18,7 @@ class Assembly {
   virtual ~Assembly() = default;
   /// Adds -d(force)/du to the values of K, whose pattern couples all rows that need it. Returns the field index of the first inadmissible
   /// point, or -1.
-  virtual std::int64_t add(ConstFieldView u, BlockMatrix& K) = 0;
+  virtual std::int64_t add(const Configuration& at, BlockMatrix& K) = 0;
   /// What is kept from one assembly to the next and depends on bonds is to be made anew.
   virtual void bonds_changed() = 0;
   /// Kept from one assembly to the next.

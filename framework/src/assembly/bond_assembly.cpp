@@ -310,7 +310,8 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
 }
 
 template <int D>
-std::int64_t BondAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
+std::int64_t BondAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
+  const ConstFieldView u = at.u();
   const std::size_t rows = rows_.size();
   memory_.prepare([&] { return std::make_unique<Memory>(laws_, formulation_.selective()); });
   Hbar_.resize(entries * rows);

@@ -17,7 +17,7 @@ class BondAssembly final : public Assembly {
  public:
   BondAssembly(const SpaceParts& parts, const BlockRows& rows);
 
-  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
+  std::int64_t add(const Configuration& at, BlockMatrix& K) override;
   void bonds_changed() override { read_bonds(); }
   std::size_t bytes() const noexcept override;
 

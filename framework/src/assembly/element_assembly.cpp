@@ -89,7 +89,8 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
 }
 
 template <int D>
-std::int64_t ElementAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
+std::int64_t ElementAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
+  const ConstFieldView u = at.u();
   if (shape_.formulation.force_state == ForceState::local) K.symmetric = false;
   memory_.prepare([&] { return std::make_unique<Memory>(laws_, shape_.formulation.selective()); });
   // Enough points at once to fill batches of the materials.

@@ -16,7 +16,7 @@ class ElementAssembly final : public Assembly {
  public:
   ElementAssembly(const SpaceParts& parts, const BlockRows& rows);
 
-  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
+  std::int64_t add(const Configuration& at, BlockMatrix& K) override;
   void bonds_changed() override {}   // elements of points that are not whole are made anew each time
   std::size_t bytes() const noexcept override { return 0; }
 

@@ -117,7 +117,7 @@ class WeightSystem {
     double* const sums = y ? y->component(d()) : nullptr;
     if (sums) std::fill_n(sums, body_.stride(), 0.0);
     const Balance balance{constant, mu.data, counted_.data(), sums, factors};
-    const BatchWork work(laws_, Work::force, false, selective_, nullptr, &balance);
+    const BatchWork work(laws_, {.selective = selective_, .balance = &balance});
     Pass pass{work, lambda, {}, out_, nullptr, nullptr, -1, {}};
     space_.run(pass);
     if (!y) return;

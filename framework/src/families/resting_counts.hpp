@@ -7,6 +7,11 @@ namespace perikit {
 struct RestingCounts {
   std::int64_t blocks = 0;                    ///< of points, evaluated or left out
   std::int64_t quiet = 0;                     ///< left out
+  RestingCounts& operator+=(const RestingCounts& other) noexcept {
+    blocks += other.blocks;
+    quiet += other.quiet;
+    return *this;
+  }
 };
 
 }  // namespace perikit

@@ -30,7 +30,7 @@ LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) co
   const bool keep = keeps_history(s);
   if (s.first_number >= 0 && laws_.records().size() == 1) {
     const std::int64_t first = s.first_number + numbers;
-    return {history_->begin() + first, keep ? history_->end() + first : nullptr, history_->stride(), history_->time_step()};
+    return {history_->begin() + first, keep ? history_->end() + first : nullptr, history_->stride(), time_step_};
   }
   for (std::size_t c = 0; c < history_->components(); ++c)
     for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
@@ -38,7 +38,7 @@ LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) co
       s.old_state[c * batch_points + static_cast<std::size_t>(l)] = q < 0 ? 0.0 : history_->begin()[c * history_->stride() + static_cast<std::size_t>(q + numbers)];
     }
   if (keep) std::fill(s.new_state.begin(), s.new_state.end(), 0.0);   // laws without a history leave theirs alone
-  return {s.old_state.data(), keep ? s.new_state.data() : nullptr, batch_points, history_->time_step()};
+  return {s.old_state.data(), keep ? s.new_state.data() : nullptr, batch_points, time_step_};
 }
 
 void BatchWork::end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept {

@@ -10,6 +10,7 @@
 #include "core/group_marks.hpp"
 #include "maps/selective_map.hpp"
 #include "operators/bond_screen.hpp"
+#include "operators/group_energy.hpp"
 #include "operators/laminates.hpp"
 #include "operators/law_history.hpp"
 #include "perikit/core/parallel.hpp"
@@ -19,12 +20,6 @@
 namespace perikit {
 
 enum class Work { force, tangent, sample };
-
-/// Of the evaluation points of a group of eight points [J].
-struct GroupEnergy {
-  double stored = 0;
-  double dissipated = 0;   ///< in the step that the evaluation ends, by laws that say so
-};
 
 /// In place of the laws, for weights that balance a constant stress (spaces/consistency.hpp): the stress of an evaluation point
 /// is (constant + tr H + multiplier of its owner) times the unit tensor.
@@ -111,23 +106,32 @@ class ScratchPool {
 
 class BondSamples;
 
+/// What is asked of the evaluation points, and what takes part. Null: nothing of that kind.
+struct BatchTask {
+  Work work = Work::force;
+  bool energy = false;                   ///< stored energies are wanted
+  bool selective = false;                ///< gradients go through the selective map
+  LawHistory* history = nullptr;
+  double time_step = 0;                  ///< of the step that the evaluation ends [s]; 0: it ends none, and no history is kept
+  const Balance* balance = nullptr;      ///< in place of laws
+  BondScreen* screen = nullptr;          ///< where bonds that may hold too much are marked
+  const Laminates* laminates = nullptr;
+  LaminateFinder* finder = nullptr;      ///< gradients are collected, and no law is evaluated
+};
+
 class BatchWork {
  public:
-  /// history: null where no law has one.
-  /// screen: null where bonds are not screened.
-  BatchWork(const Laws& laws, Work work, bool energy, bool selective, LawHistory* history, const Balance* balance = nullptr,
-            BondScreen* screen = nullptr, const Laminates* laminates = nullptr)
+  BatchWork(const Laws& laws, const BatchTask& task)
       : laws_(laws),
-        work_(work),
-        energy_(energy),
-        selective_(selective),
-        history_(history),
-        balance_(balance),
-        screen_(screen),
-        laminates_(laminates) {}
-  /// Gradients are collected, and no law is evaluated.
-  BatchWork(const Laws& laws, LaminateFinder& finder, bool selective)
-      : laws_(laws), work_(Work::sample), energy_(false), selective_(selective), history_(nullptr), balance_(nullptr), screen_(nullptr), finder_(&finder) {}
+        work_(task.work),
+        energy_(task.energy),
+        selective_(task.selective),
+        history_(task.history),
+        time_step_(task.time_step),
+        balance_(task.balance),
+        screen_(task.screen),
+        laminates_(task.laminates),
+        finder_(task.finder) {}
 
   /// With Work::sample: stresses of the selective map become derivatives by the gradients that came in, W times; with pressures.
   void pull_back() noexcept { pulled_back_ = true; }
@@ -145,7 +149,7 @@ class BatchWork {
   bool selective() const noexcept { return selective_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
   /// The evaluation ends a step in which laws dissipate.
-  bool dissipates() const noexcept { return work_ == Work::force && history_ && history_->time_step() > 0 && laws_.dissipates(); }
+  bool dissipates() const noexcept { return work_ == Work::force && history_ && time_step_ > 0 && laws_.dissipates(); }
   /// After evaluate, where bonds are screened: marks the group of eight points from first_point on if one of them may hold too
   /// much. Lanes first_lane ... first_lane + lanes - 1 belong to these points in turn.
   void screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept;
@@ -226,17 +230,18 @@ class BatchWork {
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
   void end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
-  bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && history_->time_step() > 0 && s.keep_history; }
+  bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && time_step_ > 0 && s.keep_history; }
 
   const Laws& laws_;
   Work work_;
   bool energy_;
   bool selective_, pulled_back_ = false, volume_stiffness_ = false;
   LawHistory* history_;
+  double time_step_;
   const Balance* balance_;
   BondScreen* screen_;
-  const Laminates* laminates_ = nullptr;
-  LaminateFinder* finder_ = nullptr;
+  const Laminates* laminates_;
+  LaminateFinder* finder_;
   const SampleSums* along_ = nullptr;
 };
 

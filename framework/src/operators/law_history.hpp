@@ -37,9 +37,6 @@ class LawHistory {
   const double* begin() const noexcept { return begin_.data(); }
   double* end() noexcept { return end_.data(); }
 
-  /// Evaluations that end a step of this length [s] put their history aside; 0: none does.
-  void set_time_step(double time_step) noexcept { time_step_ = time_step; }
-  double time_step() const noexcept { return time_step_; }
   /// The step is done: what the last evaluation put aside is the history from now on.
   void advance() noexcept { begin_.swap(end_); }
 
@@ -51,7 +48,6 @@ class LawHistory {
  private:
   std::size_t components_, stride_;
   AlignedVector<double> begin_, end_;
-  double time_step_ = 0;
 };
 
 }  // namespace perikit

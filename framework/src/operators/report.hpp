@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "families/resting_counts.hpp"
+
 namespace perikit {
 
 /// One decision of the set-up: what was left out, why, and what that saves.
@@ -21,6 +23,7 @@ struct ModelReport {
   std::size_t singular_families = 0;          ///< points without a gradient of their own: H = 0
   std::size_t fallbacks = 0;                  ///< evaluation points that use the whole family, or a lower order
   std::size_t dropped_parts = 0;              ///< parts of families without a gradient of their own
+  RestingCounts resting;                      ///< blocks that no wave had reached
   std::vector<SkipNote> skips;
   std::vector<std::string> warnings;                       ///< one line each
   std::vector<std::pair<std::string, std::string>> notes;  ///< further lines of run.log: label and text

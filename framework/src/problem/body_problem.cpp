@@ -130,7 +130,7 @@ std::uint64_t fingerprint_of(ConstFieldView u) {
 EvaluationStatus BodyProblem::sample(PointSamples& samples) {
   const ConstFieldView u = state().displacement();
   const bool there = kept_ && kept_->asked == samples.asked && kept_at_ == fingerprint_of(u);
-  if (!there) return terms().sample(seen(u, seen_), samples);
+  if (!there) return terms().sample({seen(u, seen_), state().time}, samples);
   samples = *std::exchange(kept_, std::nullopt);
   return {};
 }
@@ -146,31 +146,30 @@ void BodyProblem::share(FieldView field) {
   if (ghosts_) ghosts_->forward(field);
 }
 
-EvaluationStatus BodyProblem::forces(PointMotion* motion, ConstFieldView u, FieldView force, double* energy, double time_step) {
-  LawHistory* const history = terms().history();
-  if (history) history->set_time_step(time_step);
+EvaluationStatus BodyProblem::evaluate_forces(const Configuration& at, FieldView force, double* energy) {
+  const ConstFieldView u = at.unfinished();
   EvaluationStatus status;
   kept_.reset();
   const Sampling asked = std::exchange(along_, Sampling::nothing);
-  if (motion && (!motion->inside() || asked != Sampling::nothing || ghosts_ || images())) motion->finish();
+  if (at.motion() && (!at.motion()->inside() || asked != Sampling::nothing || ghosts_ || images())) at.motion()->finish();
+  const auto seen_at = [&](ConstFieldView seen) { return Configuration(seen, at.time(), at.time_step(), at.velocity()); };
   // Where histories go on or bonds fail between forces and samples these are others.
-  if (asked != Sampling::nothing && !history && !ghosts_ && !parts_.fracture.damage()) {
+  if (asked != Sampling::nothing && !terms().history() && !ghosts_ && !parts_.fracture.damage()) {
     PointSamples samples{.asked = asked};
-    status = terms().forces_and_samples(seen(u, seen_), force, energy, samples);
+    status = terms().forces_and_samples(seen_at(seen(u, seen_)), force, energy, samples);
     if (status.ok()) kept_ = std::move(samples);
     kept_at_ = fingerprint_of(u);
   } else if (!ghosts_) {
-    status = terms().forces(seen(u, seen_), force, energy, nullptr, motion);
+    status = terms().forces(images() ? seen_at(seen(u, seen_)) : at, force, energy);
   } else if (!images()) {
     ghosts_->start(Seen::writable(u));
-    status = terms().forces(Seen(u, ghosts()), force, energy, &*ghosts_);
+    status = terms().forces(seen_at(Seen(u, ghosts())).arriving(*ghosts_), force, energy);
   } else {
     copy(u, seen_);
     ghosts_->start(seen_);
     Extension extension(*ghosts_, *images(), seen_);
-    status = terms().forces(seen_, force, energy, &extension);
+    status = terms().forces(seen_at(seen_).arriving(extension), force, energy);
   }
-  if (history) history->set_time_step(0);
   describe(status);
   energy_wanted_ = energy != nullptr;
   // What is looked for on all ranks, all ranks look for.
@@ -183,14 +182,14 @@ EvaluationStatus BodyProblem::forces(PointMotion* motion, ConstFieldView u, Fiel
   return status;
 }
 
-EvaluationStatus BodyProblem::external_forces(ConstFieldView u, double t, FieldView force) {
+EvaluationStatus BodyProblem::external_forces(const Configuration& at, FieldView force) {
   if (!loads().follow()) {
-    loads().evaluate(t, force);
+    loads().evaluate(at.time(), force);
     if (ghosts_ && images()) ghosts_->clear(force);
     return {};
   }
   PointSamples samples{.asked = Sampling::H};
-  EvaluationStatus status = terms().sample(seen(u, seen_), samples);
+  EvaluationStatus status = terms().sample(at.moved_to(seen(at.u(), seen_)), samples);
   agree(status);
   if (!status.ok()) return status;
   if (ghosts_ && images()) {
@@ -200,38 +199,38 @@ EvaluationStatus BodyProblem::external_forces(ConstFieldView u, double t, FieldV
       ghosts_->forward({H.component(c), H.stride, std::min(dimension(), H.components - c)});
   }
   if (images()) images()->mirror_gradients(samples.H);
-  loads().evaluate(t, force, &samples.H);
+  loads().evaluate(at.time(), force, &samples.H);
   if (ghosts_) ghosts_->clear(force);
   return status;
 }
 
-EvaluationStatus BodyProblem::add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) {
+EvaluationStatus BodyProblem::add_load_stiffness(const Configuration& at, ConstFieldView w, FieldView Kw) {
   const double largest = largest_magnitude(w);
   if (!loads().follow() || largest < std::numeric_limits<double>::min()) return {};   // motions without digits: the step would be infinite
   // cof F is quadratic in u: central differences have no error but rounding.
   const double step = 1e-3 * body().spacing() / largest;
   Field moved = make_field(), force = make_field();
   for (const double sign : {1.0, -1.0}) {
-    combine(1, u, sign * step, w, moved);
-    const EvaluationStatus status = external_forces(moved, t, force);
+    combine(1, at.u(), sign * step, w, moved);
+    const EvaluationStatus status = external_forces(at.moved_to(moved), force);
     if (!status.ok()) return status;
     combine(1, Kw, -sign / (2 * step), force, Kw);
   }
   return {};
 }
 
-EvaluationStatus BodyProblem::tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+EvaluationStatus BodyProblem::tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) {
   if (images() && seen_direction_.size() == 0) seen_direction_ = make_field();
-  EvaluationStatus status = terms().tangent(seen(u, seen_), seen(w, seen_direction_), Kw);
+  EvaluationStatus status = terms().tangent(at.moved_to(seen(at.u(), seen_)), seen(w, seen_direction_), Kw);
   if (weak_springs_ && weak_springs_->hold() && status.ok()) weak_springs_->add_tangent(w, Kw);
   finish(Kw, status);
   return status;
 }
 
-EvaluationStatus BodyProblem::assemble_tangent(ConstFieldView u, BlockMatrix& K) {
+EvaluationStatus BodyProblem::assemble_tangent(const Configuration& at, BlockMatrix& K) {
   refuse_ranks(parts_);
   EvaluationStatus status;
-  over_own(K, tangent_of_terms_, [&](BlockMatrix& of_terms) { status = terms().assemble(seen(u, seen_), of_terms); });
+  over_own(K, tangent_of_terms_, [&](BlockMatrix& of_terms) { status = terms().assemble(at.moved_to(seen(at.u(), seen_)), of_terms); });
   if (status.ok()) hold_loose_points(terms().changed_bonds(), K);
   if (status.ok() && weak_springs_ && weak_springs_->hold()) weak_springs_->add_to(K);
   return status;
@@ -280,7 +279,7 @@ bool BodyProblem::advance(double time_step, FieldView velocity) {
       return growth;
     };
   }
-  const BondUpdate update = parts_.fracture.update(terms(), whole, state(), time_step, step);
+  const BondUpdate update = parts_.fracture.update(terms(), {whole, state().time, time_step, velocity}, state(), step);
   if (update.changed == 0) return false;
   if (velocity.data) renew_forces(moved, update.ends);
   find_pieces(true);
@@ -323,12 +322,11 @@ double BodyProblem::push(FieldView force, double time, double since, FieldView v
 
 void BodyProblem::renew_forces(std::span<const std::int32_t> moved, std::span<const std::int32_t> lost) {
   double* const energy = energy_wanted_ ? &state().energies.strain : nullptr;
-  const FieldView u = state().displacement();
   EvaluationStatus status;
   if (ghosts_ || images() || weak_springs_) {
-    status = evaluate_forces(u, state().internal_force(), energy);
+    status = evaluate_forces(configuration(), state().internal_force(), energy);
   } else {
-    status = terms().renew_forces(u, moved, lost, state().internal_force(), energy);
+    status = terms().renew_forces(configuration(), moved, lost, state().internal_force(), energy);
     describe(status);
   }
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);

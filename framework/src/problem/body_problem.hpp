@@ -47,16 +47,11 @@ class BodyProblem final : public Problem {
   ~BodyProblem() override;
 
   void share(FieldView field) override;
-  EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) override {
-    return forces(nullptr, u, force, energy, time_step);
-  }
-  EvaluationStatus move_and_evaluate_forces(PointMotion& motion, ConstFieldView u, FieldView force, double* energy, double time_step) override {
-    return forces(&motion, u, force, energy, time_step);
-  }
-  EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) override;
-  EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) override;
-  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override;
-  EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) override;
+  EvaluationStatus evaluate_forces(const Configuration& at, FieldView force, double* energy) override;
+  EvaluationStatus external_forces(const Configuration& at, FieldView force) override;
+  EvaluationStatus add_load_stiffness(const Configuration& at, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) override;
+  EvaluationStatus assemble_tangent(const Configuration& at, BlockMatrix& K) override;
   AssembledSize assembled_size() override;
   void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override;
   std::unique_ptr<VolumetricPart> volumetric_part() override;
@@ -141,8 +136,6 @@ class BodyProblem final : public Problem {
     const Ghosts* ghosts_;   ///< null where there is nothing to clear
   };
 
-  /// motion: of u; null: it is there.
-  EvaluationStatus forces(PointMotion* motion, ConstFieldView u, FieldView force, double* energy, double time_step);
   /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
   Seen seen(ConstFieldView u, Field& memory);
   /// A field with the values of ghosts, without images.

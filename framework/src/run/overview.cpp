@@ -95,7 +95,7 @@ std::string of_loads(const Scene& scene, BodyProblem& problem, double end) {
   const Body& body = problem.body();
   const int d = body.dimension();
   Field force = problem.make_field();
-  if (!problem.external_forces(problem.state().displacement(), end, force).ok()) return {};
+  if (!problem.external_forces({problem.state().displacement(), end}, force).ok()) return {};
   Vector sum{}, moment{};
   double largest = 0;
   for (const std::int32_t index : body.owned()) {

@@ -36,7 +36,7 @@ std::vector<BodyArrow> arrows_of(BodyProblem& problem, double end, double longes
   constexpr std::size_t most = 60;
   const Body& body = problem.body();
   Field force = problem.make_field();
-  if (!problem.external_forces(problem.state().displacement(), end, force).ok()) return {};
+  if (!problem.external_forces({problem.state().displacement(), end}, force).ok()) return {};
   std::vector<BodyArrow> arrows;
   double largest = 0;
   for (const std::int32_t index : body.owned()) {

@@ -43,7 +43,7 @@ double energy_of_alternating_volumes(Problem& problem, ConstFieldView u) {
   if (!volumes || !volumes->linearise(u).ok()) return 0;
   Field force = problem.make_field();
   double strain_energy = 0;
-  if (!problem.evaluate_forces(u, force, &strain_energy).ok() || !(strain_energy > 0)) return 0;
+  if (!problem.evaluate_forces({u, problem.state().time}, force, &strain_energy).ok() || !(strain_energy > 0)) return 0;
   BlockMatrix neighbours;
   problem.assemble_companion(u, neighbours, ordinary_bulk);
   const Field logarithms = shared(problem, volumes->logarithms()), stiffnesses = shared(problem, volumes->stiffness());

@@ -64,7 +64,7 @@ EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, ConstFiel
       return {.given_up = true};
     }
     for (std::size_t i = 0; i < n; ++i) w.data()[i] = scale.data[i] * q.data[i];
-    if (!problem.tangent_action(u, w, Kw).ok()) return {};
+    if (!problem.tangent_action({u, problem.state().time}, w, Kw).ok()) return {};
     for (std::size_t i = 0; i < n; ++i) Kw.data()[i] *= scale.data[i];
     alpha.push_back(dot(Kw, q));
     const double b = beta.empty() ? 0.0 : beta.back();
@@ -107,7 +107,7 @@ double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u,
   constexpr int most = 80;
   for (int step = 0;; ++step) {
     for (std::size_t k = 0; k < n; ++k) w.data()[entries[k]] = scale.data[entries[k]] * q[k];
-    if (!part.tangent_action(u, w, Kw).ok()) return 0;
+    if (!part.tangent_action({u, problem.state().time}, w, Kw).ok()) return 0;
     for (std::size_t k = 0; k < n; ++k) Kq[k] = scale.data[entries[k]] * Kw.data()[entries[k]];
     alpha.push_back(product(Kq, q));
     const double b = beta.empty() ? 0.0 : beta.back();

@@ -25,7 +25,7 @@ void Equilibrium::begin(double t, ConstFieldView u) {
   fill_with_noise(free_, 1, problem_.body().places(), noise);
   const double size = norm(noise);
   // Where the start itself is inadmissible there is nothing to estimate; the first residual says so.
-  if (size > 0 && problem_.tangent_action(u, noise, scratch_).ok()) stiffness_ = norm(scratch_) / size;
+  if (size > 0 && problem_.tangent_action(at(u), noise, scratch_).ok()) stiffness_ = norm(scratch_) / size;
 }
 
 double Equilibrium::missing(ConstFieldView u, FieldView w) {
@@ -45,13 +45,13 @@ bool Equilibrium::goes_on() {
 bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
   if (!goes_on()) return false;
   const FieldView internal = problem_.state().internal_force();
-  const EvaluationStatus status = problem_.evaluate_forces(u, internal, energy);
+  const EvaluationStatus status = problem_.evaluate_forces(at(u), internal, energy);
   if (!status.ok()) {
     failure_ = status.description;
     return false;
   }
   copy(internal, r);
-  if (problem_.loads().follow() && !problem_.external_forces(u, t_, external_).ok()) {
+  if (problem_.loads().follow() && !problem_.external_forces(at(u), external_).ok()) {
     failure_ = "the pressure met an inadmissible deformation";
     return false;
   }
@@ -81,8 +81,8 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
 bool Equilibrium::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
   if (!goes_on()) return false;
   if (observer_ && ++actions_ % 8 == 0) observer_->working(fmt::format("t = {:.4g}: {}{}, {} tangent actions", t_, stage_, last_note_, actions_));
-  EvaluationStatus status = problem_.tangent_action(u, w, Kw);
-  if (status.ok() && problem_.loads().follow()) status = problem_.add_load_stiffness(u, t_, w, Kw);
+  EvaluationStatus status = problem_.tangent_action(at(u), w, Kw);
+  if (status.ok() && problem_.loads().follow()) status = problem_.add_load_stiffness(at(u), w, Kw);
   if (!status.ok()) {
     failure_ = status.description.empty() ? "the tangent met an inadmissible deformation" : status.description;
     return false;

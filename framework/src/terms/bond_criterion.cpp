@@ -116,12 +116,13 @@ void BondCriterion::end_forces(ConstFieldView u) {
 }
 
 /// Statics look for bonds at displacements that need not be those of their last evaluation.
-void BondCriterion::mark_by_forces(ConstFieldView u) {
+void BondCriterion::mark_by_forces(const Configuration& at) {
+  const ConstFieldView u = at.u();
   if (!marked_by_forces_ || known_at(u)) return;
   clear_forces(u.components);
   begin_forces();
   for (const auto& term : terms_)
-    if (term->add_forces(u, forces_, nullptr) >= 0) return;
+    if (term->forces(at.moved_to(u), {}, {forces_}) >= 0) return;
   end_forces(u);
 }
 
@@ -151,14 +152,14 @@ std::span<const BondId> BondCriterion::named_in(std::int32_t first_group, std::i
 }
 
 /// The points with bonds that may fail at u.
-GroupMarks BondCriterion::near_failure(ConstFieldView u) {
-  const bool known = known_at(u);
+GroupMarks BondCriterion::near_failure(const Configuration& at) {
+  const bool known = known_at(at.u());
   if (known && terms_.size() == 1) return screen_.near;
   if (!by_point_ || screen_.near.empty()) return known ? screen_.near : GroupMarks(own_.size(), whole_group);
   // What points hold of all terms is cheaper than a look at their bonds.
   const BondSampling asked = samples_.what();
   samples_.ask(BondSampling::energy);
-  collect(u, known ? families_.evaluated(screen_.near) : GroupMarks(screen_.near.size(), whole_group), {});
+  collect(at, known ? families_.evaluated(screen_.near) : GroupMarks(screen_.near.size(), whole_group), {});
   GroupMarks near(screen_.near.size(), 0);
   for (const BondSamples::Entry& entry : samples_.entries()) {
     const auto p = static_cast<std::size_t>(entry.owner);
@@ -189,14 +190,14 @@ GroupMarks BondCriterion::looked_at(std::span<const std::int32_t> groups) const 
 }
 
 /// What the evaluation points of these points hold, and those of the far ends of the bonds that are looked at.
-void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView u) {
+void BondCriterion::sample(std::span<const std::int32_t> groups, const Configuration& at) {
   if (groups.empty()) return;
   own_ = looked_at(groups);
   if (flux_.flux.data) {
     samples_.ask(BondSampling::energy);
-    return collect(u, own_, own_);
+    return collect(at, own_, own_);
   }
-  if (formulation_.pairs) return collect(u, own_, own_);  // both ends at once
+  if (formulation_.pairs) return collect(at, own_, own_);  // both ends at once
   if (named_.empty()) {
     near_ = families_.around(own_);
   } else {
@@ -204,41 +205,45 @@ void BondCriterion::sample(std::span<const std::int32_t> groups, ConstFieldView 
     for (const BondId bond : named_in(groups.front(), groups.back())) ends.insert(ends.end(), {bond.point, bond.far});
     near_ = families_.marks_of(ends);
   }
-  if (!release_) return collect(u, near_, own_);
+  if (!release_) return collect(at, near_, own_);
   samples_.ask(BondSampling::derivative);
   const GroupMarks owners = release_->reach() > 1 ? families_.around(near_) : near_;
-  collect(u, owners, near_);
-  release_->find(u, near_, owners, {own_, named_}, samples_);
+  collect(at, owners, near_);
+  release_->find(at.u(), near_, owners, {own_, named_}, samples_);
 }
 
-void BondCriterion::find_flux(std::span<const std::int32_t> groups, ConstFieldView u) {
+void BondCriterion::find_flux(std::span<const std::int32_t> groups, const Configuration& at) {
   if (!release_ || !release_->follows_from_flux() || groups.empty()) return;
-  if (known_at(u)) flux_ = terms_.front()->point_flux();
+  const ConstFieldView u = at.u();
+  BreakableTerm& bonds = *terms_.front()->breakable();
+  if (known_at(u)) flux_ = bonds.point_flux();
   if (flux_.everywhere) return;
   flux_ = {};
   // The points of their families, and whatever has a bond with those.
   const GroupMarks marks = families_.around(families_.around(looked_at(groups)));
   clear_forces(u.components);
-  if (terms_.front()->add_forces_of(u, marks, families_.around(marks), forces_, nullptr) < 0) flux_ = terms_.front()->point_flux();
+  const GroupMarks near = families_.around(marks);
+  if (terms_.front()->forces(at.moved_to(u), {&marks, &near}, {forces_}) < 0) flux_ = bonds.point_flux();
 }
 
 /// Of the evaluation points of these owners; kept: see BondSamples::clear.
-void BondCriterion::collect(ConstFieldView u, const GroupMarks& owners, const GroupMarks& kept) {
+void BondCriterion::collect(const Configuration& at, const GroupMarks& owners, const GroupMarks& kept) {
   const GroupMarks wide = families_.around(owners);
   samples_.clear(kept);
   if (formulation_.pairs) samples_.want(looked_at_);  // of others evaluation points are those of groups
-  for (const auto& term : terms_) term->add_bonds(u, owners, wide, samples_);
+  for (const auto& term : terms_)
+    if (BreakableTerm* const bonds = term->breakable()) bonds->add_bonds(at.moved_to(at.u()), {&owners, &wide}, samples_);
   samples_.merge();
 }
 
 template <class Visit>
-void BondCriterion::by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit) {
+void BondCriterion::by_pieces(std::span<const std::int32_t> groups, const Configuration& at, Visit&& visit) {
   while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Bonds>());
   const std::size_t bonds_each = std::max<std::size_t>(1, families_.bonds() / std::max<std::size_t>(1, groups_.size()));
   const std::size_t piece = by_point_ ? groups.size() : std::max<std::size_t>(1, most_at_once / bonds_each);
   for (std::size_t first = 0; first < groups.size(); first += piece) {
     const auto of_piece = groups.subspan(first, std::min(piece, groups.size() - first));
-    sample(of_piece, u);
+    sample(of_piece, at);
     visit(of_piece);
   }
   checked_ += groups.size();
@@ -327,22 +332,23 @@ void BondCriterion::bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit
   }
 }
 
-std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
+std::vector<BondChange> BondCriterion::find(const Configuration& at) {
+  const ConstFieldView u = at.u();
   std::vector<BondChange> all;
   found_.clear();
   found_at_ = u.data;
-  if (release_) mark_by_forces(u);
+  if (release_) mark_by_forces(at);
   named_.clear();
   const bool by_bond = (skip_ || release_) && screen_.by_bond() && known_at(u);
   if (by_bond) {
     name_near_failure();
     look_at_named();
   } else {
-    looked_at_ = skip_ || release_ ? near_failure(u) : GroupMarks(own_.size(), whole_group);
+    looked_at_ = skip_ || release_ ? near_failure(at) : GroupMarks(own_.size(), whole_group);
   }
   const std::vector<std::int32_t> near = groups_with(looked_at_);
-  find_flux(near, u);
-  by_pieces(near, u, [&](std::span<const std::int32_t> groups) {
+  find_flux(near, at);
+  by_pieces(near, at, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<Found>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {
       bonds_of(groups[g], u, [&](std::int32_t p, Bonds& m) {
@@ -363,10 +369,11 @@ std::vector<BondChange> BondCriterion::find(ConstFieldView u) {
   return all;
 }
 
-void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) {
+void BondCriterion::values(std::span<const BondId> bonds, const Configuration& at, std::span<double> values) {
+  const ConstFieldView u = at.u();
   const auto known = [&](BondId bond) {
-    const auto at = std::ranges::lower_bound(found_, bond, {}, [](const Found& f) { return f.change.bond; });
-    return at != found_.end() && at->change.bond == bond ? &*at : nullptr;
+    const auto first = std::ranges::lower_bound(found_, bond, {}, [](const Found& f) { return f.change.bond; });
+    return first != found_.end() && first->change.bond == bond ? &*first : nullptr;
   };
   // Another rank may have found a bond that was not looked at here.
   if (u.data == found_at_ && std::ranges::all_of(bonds, known)) {
@@ -380,8 +387,8 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   named_.assign(bonds.begin(), bonds.end());
   std::ranges::sort(named_);
   look_at_named();
-  find_flux(groups, u);
-  sample(groups, u);
+  find_flux(groups, at);
+  sample(groups, at);
   Bonds& m = *memory_[0];
   for (std::size_t k = 0; k < bonds.size(); ++k) {
     load(bonds[k].point, u, {&bonds[k], 1}, m);
@@ -390,12 +397,13 @@ void BondCriterion::values(std::span<const BondId> bonds, ConstFieldView u, std:
   flux_ = {};
 }
 
-std::vector<BondEnergy> BondCriterion::energies(ConstFieldView u) {
+std::vector<BondEnergy> BondCriterion::energies(const Configuration& at) {
+  const ConstFieldView u = at.u();
   std::vector<BondEnergy> all;
   looked_at_.assign(own_.size(), whole_group);
   named_.clear();
-  find_flux(groups_, u);
-  by_pieces(groups_, u, [&](std::span<const std::int32_t> groups) {
+  find_flux(groups_, at);
+  by_pieces(groups_, at, [&](std::span<const std::int32_t> groups) {
     std::vector<std::vector<BondEnergy>> found(groups.size());
     parallel_for(groups.size(), [&](std::size_t g) {
       bonds_of(groups[g], u, [&](std::int32_t p, Bonds& m) {

@@ -24,8 +24,8 @@ class BondCriterion final : public BondFinder {
   /// bond in every step, save for those that hold too little to fail by what they set free.
   BondCriterion(const ReleaseParts& parts, DamageTraits asked, const BodyDamage* damage, TermsOf terms, bool skip);
 
-  std::vector<BondChange> find(ConstFieldView u) override;
-  void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) override;
+  std::vector<BondChange> find(const Configuration& at) override;
+  void values(std::span<const BondId> bonds, const Configuration& at, std::span<double> values) override;
   void forget() noexcept override {}
   std::size_t groups() const noexcept override { return groups_.size(); }
   std::size_t checked() const noexcept override { return checked_; }
@@ -40,7 +40,7 @@ class BondCriterion final : public BondFinder {
   void begin_forces();
   void end_forces(ConstFieldView u);
   /// Of all bonds, ascending: what they hold, or dE/db.
-  std::vector<BondEnergy> energies(ConstFieldView u);
+  std::vector<BondEnergy> energies(const Configuration& at);
 
  private:
   /// Arrays over the bonds of one point: those with a larger index, and those whose far ends are not looked at. Memory of one
@@ -56,24 +56,24 @@ class BondCriterion final : public BondFinder {
   bool looks_at(std::size_t p) const noexcept { return marked(own_, p) && marked(looked_at_, p); }
   /// Whether the last evaluation of forces with a screen was at u.
   bool known_at(ConstFieldView u) const noexcept { return screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin()); }
-  GroupMarks near_failure(ConstFieldView u);
+  GroupMarks near_failure(const Configuration& at);
   void name_near_failure();
   /// The named bonds, at their lower ends.
   void look_at_named();
   std::span<const BondId> named_in(std::int32_t first_group, std::int32_t last_group) const noexcept;
-  /// Evaluates forces at u, where the last evaluation was at other displacements, for the marks that they leave.
-  void mark_by_forces(ConstFieldView u);
+  /// Evaluates forces here, where the last evaluation was at other displacements, for the marks that they leave.
+  void mark_by_forces(const Configuration& at);
   void clear_forces(int components);
   std::vector<std::int32_t> groups_with(const GroupMarks& marks) const;
   /// Visits the groups piece by piece, with the samples of a piece at hand: visit(groups of the piece).
   template <class Visit>
-  void by_pieces(std::span<const std::int32_t> groups, ConstFieldView u, Visit&& visit);
+  void by_pieces(std::span<const std::int32_t> groups, const Configuration& at, Visit&& visit);
   GroupMarks looked_at(std::span<const std::int32_t> groups) const;
-  void sample(std::span<const std::int32_t> groups, ConstFieldView u);
+  void sample(std::span<const std::int32_t> groups, const Configuration& at);
   /// Where the flux that forces leave is all that a look at the bonds of these groups takes: that of the last forces if they were at u, else of forces
   /// about the groups. So what a bond sets free has the same bits whatever was evaluated before.
-  void find_flux(std::span<const std::int32_t> groups, ConstFieldView u);
-  void collect(ConstFieldView u, const GroupMarks& owners, const GroupMarks& kept);
+  void find_flux(std::span<const std::int32_t> groups, const Configuration& at);
+  void collect(const Configuration& at, const GroupMarks& owners, const GroupMarks& kept);
   /// Bonds of the points of a group, as arrays in the memory of this thread: visit(p, bonds).
   template <class Visit>
   void bonds_of(std::int32_t group, ConstFieldView u, Visit&& visit);

@@ -31,8 +31,12 @@ void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
   if (laminates_) find_laminates(laminates_->near(), true);
 }
 
-BatchWork Mechanics::work(Work kind, bool energy, BondScreen* screen) const noexcept {
-  return {parts_.laws, kind, energy, parts_.formulation.selective(), history_.get(), nullptr, screen, laminates_.get()};
+BatchWork Mechanics::work(const Configuration& at, BatchTask task) const noexcept {
+  task.selective = parts_.formulation.selective();
+  task.history = history_.get();
+  task.time_step = at.time_step();
+  task.laminates = laminates_.get();
+  return {parts_.laws, task};
 }
 
 void Mechanics::bonds_changed(std::span<const std::int32_t> points) {
@@ -48,7 +52,7 @@ void Mechanics::bonds_changed(std::span<const std::int32_t> points) {
 std::vector<LaminateFinder::Found> Mechanics::gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near,
                                                         bool with_weightless) {
   LaminateFinder finder(parts_.families.body().dimension(), parts_.formulation.pair_symmetric && parts_.share, keep, with_weightless);
-  const BatchWork work(parts_.laws, finder, parts_.formulation.selective());
+  const BatchWork work(parts_.laws, {.work = Work::sample, .selective = parts_.formulation.selective(), .finder = &finder});
   Pass pass{work, values, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data()};
   space_->run(pass);
   return finder.take();
@@ -148,62 +152,28 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
   }
 }
 
-void Mechanics::add_owned(const std::vector<GroupEnergy>& energies, double GroupEnergy::* which, ExactSum& sum) const {
-  perikit::add_owned(parts_.families.body(), energies, [which](const GroupEnergy& energy) { return energy.*which; }, sum);
-}
-
-std::int64_t Mechanics::forces(ConstFieldView u, FieldView force, ExactSum* energy, const Beside& beside) {
-  BatchWork work = this->work(Work::force, energy != nullptr, screen_);
-  if (beside.samples) work.sample_along(*beside.samples);
-  const bool dissipates = work.dissipates(), wanted = energy || dissipates;
-  if (wanted) energies_ = no_energies();
-  Pass pass{work, u, {}, force, nullptr, wanted ? energies_.data() : nullptr, -1, {}};
-  pass.arrival = beside.arrival;
-  pass.motion = beside.motion;
+std::int64_t Mechanics::add_forces(const Configuration& at, const Region& region, const ForceSum& sum, const SampleSums* samples) {
+  BatchWork work = this->work(at, {.work = Work::force, .energy = sum.wants_stored(), .screen = region.whole() ? screen_ : nullptr});
+  if (samples) work.sample_along(*samples);
+  Pass pass{work, at.unfinished(), {}, sum.force, nullptr, sum.energies.empty() ? nullptr : sum.energies.data(), -1, {}, region.only(), region.near()};
+  pass.arrival = at.arrival();
+  pass.motion = at.motion();
   if (pass.motion && !space_->moves_points()) pass.motion->finish();
   space_->run(pass);
-  if (energy) add_owned(energies_, &GroupEnergy::stored, *energy);
-  if (dissipates) {
-    dissipated_ = {};
-    add_owned(energies_, &GroupEnergy::dissipated, dissipated_);
-  }
   return pass.bad;
 }
 
-/// only, near: null: all.
-std::int64_t Mechanics::tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only, const std::uint8_t* near) {
-  const BatchWork work = this->work(Work::tangent, false);
-  Pass pass{work, u, w, Kw, nullptr, nullptr, -1, {}, only, near};
+std::int64_t Mechanics::tangent(const Configuration& at, ConstFieldView w, const Region& region, FieldView Kw) {
+  const BatchWork work = this->work(at, {.work = Work::tangent});
+  Pass pass{work, at.u(), w, Kw, nullptr, nullptr, -1, {}, region.only(), region.near()};
   space_->run(pass);
   return pass.bad;
 }
 
-std::int64_t Mechanics::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
-                                      ExactSum* energy) {
-  const BatchWork work = this->work(Work::force, energy != nullptr);
-  std::vector<GroupEnergy> energies;
-  if (energy) energies = no_energies();
-  Pass pass{work, u, {}, force, nullptr, energy ? energies.data() : nullptr, -1, {}, only.data(), near.data()};
-  space_->run(pass);
-  if (energy) add_owned(energies, &GroupEnergy::stored, *energy);
-  return pass.bad;
-}
-
-std::int64_t Mechanics::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
-                                     ExactSum& energy) {
-  const BatchWork work = this->work(Work::force, true);
-  std::vector<GroupEnergy> renewed = no_energies();
-  Pass pass{work, u, {}, force, nullptr, renewed.data(), -1, {}, only.data(), near.data()};
-  space_->run(pass);
-  replace(complete, renewed, energies_);
-  add_owned(energies_, &GroupEnergy::stored, energy);
-  return pass.bad;
-}
-
-void Mechanics::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
-  BatchWork work = this->work(Work::sample, false);
+void Mechanics::add_bonds(const Configuration& at, const Region& region, BondSamples& samples) {
+  BatchWork work = this->work(at, {.work = Work::sample});
   if (samples.what() == BondSampling::derivative) work.pull_back();
-  Pass pass{work, u, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data(), &samples};
+  Pass pass{work, at.u(), {}, {}, nullptr, nullptr, -1, {}, region.only(), region.near(), &samples};
   space_->run(pass);
 }
 
@@ -245,21 +215,24 @@ class Averages {
 
 }  // namespace
 
-std::int64_t Mechanics::add_samples(ConstFieldView u, PointSamples& samples) {
+std::int64_t Mechanics::sample(const Configuration& at, PointSamples& samples) {
   Averages averages(parts_.families.body(), parts_.laws, samples);
   const SampleSums sums = averages.sums();
-  const BatchWork work = this->work(Work::sample, false);
-  Pass pass{work, u, {}, {}, &sums, nullptr, -1, {}};
+  const BatchWork work = this->work(at, {.work = Work::sample});
+  Pass pass{work, at.u(), {}, {}, &sums, nullptr, -1, {}};
   space_->run(pass);
   averages.finish();
   return pass.bad;
 }
 
-std::int64_t Mechanics::add_forces_and_samples(ConstFieldView u, FieldView force, ExactSum* energy, PointSamples& samples) {
-  if (!space_->samples_along() || parts_.numbered()) return Term::add_forces_and_samples(u, force, energy, samples);
+std::int64_t Mechanics::forces_and_samples(const Configuration& at, const ForceSum& sum, PointSamples& samples) {
+  if (!space_->samples_along() || parts_.numbered()) {
+    const std::int64_t bad = forces(at, {}, sum);
+    return bad < 0 ? sample(at, samples) : bad;
+  }
   Averages averages(parts_.families.body(), parts_.laws, samples);
   const SampleSums sums = averages.sums();
-  const std::int64_t bad = forces(u, force, energy, {.samples = &sums});
+  const std::int64_t bad = add_forces(at, {}, sum, &sums);
   averages.finish();
   return bad;
 }
@@ -281,7 +254,7 @@ std::int64_t Mechanics::stiffness_near_laminates(ConstFieldView u, FieldView sti
   const GroupMarks near = parts_.families.around(marks);
   Field sums = body.make_field(1);
   const SampleSums to{.weight = nullptr, .psi = sums.data(), .H = nullptr, .P = nullptr, .cauchy = nullptr, .von_mises = nullptr, .stride = body.stride()};
-  BatchWork work = this->work(Work::sample, false);
+  BatchWork work = this->work({u, 0}, {.work = Work::sample});
   work.sample_volume_stiffness();
   Pass pass{work, u, {}, {}, &to, nullptr, -1, {}, marks.data(), near.data()};
   space_->run(pass);
@@ -329,6 +302,7 @@ std::unique_ptr<VolumetricRows> Mechanics::make_volumetric_rows() {
 
 void Mechanics::report(ModelReport& report) const {
   space_->report(report);
+  report.resting += space_->resting_counts();
   if (history_) report.bytes += history_->bytes();
   if (consistency_) consistency_->report(report);
   if (!laminates_) return;

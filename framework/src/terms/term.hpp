@@ -1,105 +1,120 @@
 #pragma once
-/// One thing that adds to the forces, the energy and the tangent of a body. Evaluations return the internal index of the first
-/// inadmissible point, or -1; results are undefined then.
+/// One thing that adds to the forces, the energy and the tangent of a body. Three functions are all that a term must have; what else it can do it says by
+/// the capabilities that it returns.
 
 #include <memory>
 #include <span>
 
 #include "assembly/assembly.hpp"
+#include "assembly/volumetric_rows.hpp"
 #include "families/families.hpp"
-#include "families/resting_counts.hpp"
 #include "operators/bond_samples.hpp"
+#include "operators/group_energy.hpp"
+#include "operators/law_history.hpp"
 #include "operators/point_flux.hpp"
 #include "operators/report.hpp"
 #include "operators/samples.hpp"
-#include "perikit/core/exact_sum.hpp"
-#include "perikit/core/parallel.hpp"
-#include "perikit/core/point_motion.hpp"
+#include "perikit/model/configuration.hpp"
 
 namespace perikit {
+
+/// The evaluation points that an evaluation takes; by default all. They are those of the points `evaluated`, and the same few others whichever bonds have failed.
+/// `gradients`: those points and everything in their families. Forces are complete, and bit for bit those of the whole body, at points all of whose
+/// evaluation points lie in `evaluated`: those with a whole neighbourhood of max(coupling reach - 1, 1) families there. Elsewhere they are partial
+/// sums, which callers ignore.
+struct Region {
+  const GroupMarks* evaluated = nullptr;
+  const GroupMarks* gradients = nullptr;
+  bool whole() const noexcept { return evaluated == nullptr; }
+  /// Null: all.
+  const std::uint8_t* only() const noexcept { return evaluated ? evaluated->data() : nullptr; }
+  const std::uint8_t* near() const noexcept { return gradients ? gradients->data() : nullptr; }
+};
+
+/// What an evaluation of forces adds to.
+struct ForceSum {
+  FieldView force;                       ///< += -dE/du [N]
+  std::span<GroupEnergy> energies = {};  ///< += by group of eight points [J]; empty: not wanted
+  bool stored = true;                    ///< stored energies are wanted, not only dissipated ones
+  bool wants_stored() const noexcept { return stored && !energies.empty(); }
+};
+
+class AssembledTerm;
+class SampledTerm;
+class BreakableTerm;
+class StatefulTerm;
 
 class Term {
  public:
   virtual ~Term() = default;
-  /// force += -dE/du [N]; *energy += E of what this rank owns [J] where wanted.
-  virtual std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) = 0;
-  /// The same while displacements of points of other ranks are on their way, which have arrived when it returns.
-  virtual std::int64_t add_forces_meanwhile(Arrival& arrival, ConstFieldView u, FieldView force, ExactSum* energy) {
-    arrival.finish();
-    return add_forces(u, force, energy);
-  }
-  /// The same of displacements that `motion` makes, which also sets force to zero on the points that it moves. All have moved when this returns.
-  virtual std::int64_t move_and_add_forces(PointMotion& motion, ConstFieldView u, FieldView force, ExactSum* energy) {
-    motion.finish();
-    return add_forces(u, force, energy);
-  }
-  /// Forces and samples of the same displacements, each with the bits that it has alone.
-  virtual std::int64_t add_forces_and_samples(ConstFieldView u, FieldView force, ExactSum* energy, PointSamples& samples) {
-    const std::int64_t bad = add_forces(u, force, energy);
-    return bad < 0 ? add_samples(u, samples) : bad;
-  }
-  /// Kw += -d(force)/du w [N].
-  virtual std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
-  /// Adds to the energy density, and sets what else it knows.
-  virtual std::int64_t add_samples(ConstFieldView u, PointSamples& samples) = 0;
+  /// Adds the forces and energies of the region. Returns the internal index of the first inadmissible point, or -1; sums are undefined then.
+  virtual std::int64_t forces(const Configuration& at, const Region& region, const ForceSum& sum) = 0;
+  /// Kw += -d(force)/du w [N]; returns as `forces` does.
+  virtual std::int64_t tangent(const Configuration& at, ConstFieldView w, const Region& region, FieldView Kw) = 0;
+  /// Adds bytes, counts and notes of what is left out.
+  virtual void report(ModelReport& report) const = 0;
 
+  /// Null: the tangent couples no two points, and its blocks are taken from `tangent`.
+  virtual AssembledTerm* assembled() noexcept { return nullptr; }
+  /// Null: energies by point are unknown, and samples lack them.
+  virtual SampledTerm* sampled() noexcept { return nullptr; }
+  /// Null: it knows nothing of bonds.
+  virtual BreakableTerm* breakable() noexcept { return nullptr; }
+  /// Null: it remembers nothing.
+  virtual StatefulTerm* stateful() noexcept { return nullptr; }
+};
+
+/// A term whose tangent couples points.
+class AssembledTerm {
+ public:
+  virtual ~AssembledTerm() = default;
   /// The tangent couples two points only where a chain of at most so many bonds joins them.
   virtual int coupling_reach() const noexcept = 0;
   /// The rows outlive the assembly.
   virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
-
-  // Where bonds fail.
-  /// Evaluates the evaluation points of the points `only`, and the same few others whichever bonds have failed. `near`: those points and everything in
-  /// their families. Forces are complete, and bit for bit those of add_forces, at points all of whose evaluation points lie in `only`: those with a whole
-  /// neighbourhood of max(coupling_reach() - 1, 1) families there. Elsewhere they are partial sums, which callers ignore.
-  /// *energy += their E, of what this rank owns [J], where wanted.
-  virtual std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
-                                     ExactSum* energy) = 0;
-  /// Marks the points whose energies are summed up together with those of marked ones.
-  virtual void complete(GroupMarks& marks) const { mark_whole_runs(1, marks); }
-  /// As add_forces_of. The energies of the points of `complete`, which lie in `only`, take the place of those that the last add_forces with an
-  /// energy left, or the last of these calls; energy += E of all points, bit for bit as add_forces has it.
-  virtual std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
-                                    ExactSum& energy) = 0;
-  /// Kw += -d(force)/du w of the evaluation points that add_forces_of takes, with the same promise.
-  virtual std::int64_t add_tangent_of(ConstFieldView u, ConstFieldView w, const GroupMarks& only, const GroupMarks& near,
-                                      FieldView Kw) = 0;
-  /// What the evaluation points of the marked points hold; point gradients are needed at `near`.
-  virtual void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) = 0;
-  /// What follows from the bonds of these points is to be computed anew.
-  virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
-  /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.
-  virtual const NearestFailure* watch(const BodyDamage& damage) = 0;
-
-  /// Of the last evaluation, where that was one of forces, and leaves any.
-  virtual PointFlux point_flux() const noexcept { return {}; }
-
-  /// Evaluations of forces are to mark the groups of bonds that may hold too much energy, from now on; null: no longer. Returns whether they do.
-  virtual bool screen(BondScreen* screen) = 0;
-
-  /// Adds bytes, counts and notes of what is left out.
-  virtual void report(ModelReport& report) const = 0;
-  virtual RestingCounts resting_counts() const noexcept = 0;
+  /// What of the tangent resists changes of the volumes of points; null where volumes are not those of points. The term must outlive it.
+  virtual std::unique_ptr<VolumetricRows> make_volumetric_rows() { return nullptr; }
 };
 
-/// What a term sums up by group of eight points [J], of which each is one rank's.
-template <class Energy, class Value>
-void add_owned(const Body& body, const std::vector<Energy>& energies, Value&& value, ExactSum& sum) {
-  for (std::size_t g = 0; g < energies.size(); ++g)
-    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
-      if (!body.alive(p)) continue;
-      if (body.owns(p)) sum.add(value(energies[g]));
-      break;
-    }
-}
-inline void add_owned(const Body& body, const std::vector<double>& energies, ExactSum& sum) {
-  add_owned(body, energies, [](double energy) { return energy; }, sum);
-}
-/// kept[g] <- renewed[g] for the groups in `complete`.
-template <class Energy>
-void replace(const GroupMarks& complete, const std::vector<Energy>& renewed, std::vector<Energy>& kept) {
-  for (std::size_t g = 0; g < kept.size(); ++g)
-    if (complete[g]) kept[g] = renewed[g];
-}
+/// A term that knows what its points hold.
+class SampledTerm {
+ public:
+  virtual ~SampledTerm() = default;
+  /// Adds to the energy density, and sets what else it knows. Returns as Term::forces does.
+  virtual std::int64_t sample(const Configuration& at, PointSamples& samples) = 0;
+  /// Forces of the whole body and samples, each with the bits that it has alone.
+  virtual std::int64_t forces_and_samples(const Configuration& at, const ForceSum& sum, PointSamples& samples) = 0;
+};
+
+/// A term over bonds that may fail.
+class BreakableTerm {
+ public:
+  virtual ~BreakableTerm() = default;
+  /// What follows from the bonds of these points is to be computed anew.
+  virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
+  /// Marks the points whose energies are summed up together with those of marked ones.
+  virtual void complete(GroupMarks& marks) const { mark_whole_runs(1, marks); }
+  /// What the evaluation points of the region hold.
+  virtual void add_bonds(const Configuration& at, const Region& region, BondSamples& samples) = 0;
+  /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.
+  virtual const NearestFailure* watch(const BodyDamage&) { return nullptr; }
+  /// Evaluations of forces of the whole body mark the groups of bonds that may hold too much energy, from now on; null: no longer.
+  virtual void screen(BondScreen* screen) = 0;
+  /// Of the last evaluation, where that was one of forces, and leaves any.
+  virtual PointFlux point_flux() const noexcept { return {}; }
+};
+
+/// A term whose evaluation points remember what has happened to them.
+class StatefulTerm {
+ public:
+  virtual ~StatefulTerm() = default;
+  virtual LawHistory& history() noexcept = 0;
+  /// Its values were replaced.
+  virtual void history_restored() = 0;
+  /// Its evaluation points here, ascending. Failed bonds have none.
+  virtual std::vector<HistoryPlace> history_points() = 0;
+  /// Energies that are dissipated in a step come with its forces.
+  virtual bool dissipates() const noexcept = 0;
+};
 
 }  // namespace perikit

@@ -75,6 +75,34 @@ void warn_of_energy(const TermParts& parts, ModelReport& report) {
 
 }  // namespace
 
+/// The blocks of a term whose tangent couples no two points: what it does to a motion of all points alike.
+class Terms::PointBlocks final : public Assembly {
+ public:
+  PointBlocks(Term& term, const BlockRows& rows) : term_(term), rows_(rows) {}
+  std::int64_t add(const Configuration& at, BlockMatrix& K) override {
+    const auto d = static_cast<std::size_t>(rows_.body().dimension());
+    Field w = rows_.body().make_field(static_cast<int>(d)), Kw = w;
+    for (std::size_t e = 0; e < d; ++e) {
+      fill(0, w);
+      fill(0, Kw);
+      std::fill_n(w.component(static_cast<int>(e)), w.stride(), 1.0);
+      const std::int64_t bad = term_.tangent(at, w, {}, Kw);
+      if (bad >= 0) return bad;
+      for (std::size_t r = 0; r < rows_.size(); ++r)
+        for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+          for (std::size_t c = 0; c < d && K.column[b] == static_cast<std::int32_t>(r); ++c)
+            K.values[(b * d + c) * d + e] += Kw.component(static_cast<int>(c))[rows_.point(r)];
+    }
+    return -1;
+  }
+  void bonds_changed() override {}
+  std::size_t bytes() const noexcept override { return 0; }
+
+ private:
+  Term& term_;
+  const BlockRows& rows_;
+};
+
 /// One assembly for each term, over common block rows.
 struct Terms::Assemblies {
   BlockRows rows;
@@ -112,16 +140,17 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   } else {
     auto mechanics = std::make_unique<Mechanics>(
         SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, meeting});
-    mechanics_ = mechanics.get();
-    if (parts_.consistency) mechanics_->balance(parts_.consistency);
+    if (parts_.consistency) mechanics->balance(parts_.consistency);
     terms_.push_back(std::move(mechanics));
   }
   if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
   for (const TermMaker& make : parts_.further) terms_.push_back(make(parts_));
+  energies_.resize(terms_.size());
   if (!parts_.damage) return;
   const NearestFailure* known = nullptr;
   for (const auto& term : terms_) {
-    const NearestFailure* of_term = term->watch(*parts_.damage);
+    BreakableTerm* const bonds = term->breakable();
+    const NearestFailure* const of_term = bonds ? bonds->watch(*parts_.damage) : nullptr;
     if (of_term) known = of_term;
   }
   Families& all = *parts_.families;
@@ -131,12 +160,12 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
     finder = all.make_monitor(*parts_.damage, parts_.skip, known);
   else {
     auto criterion = std::make_unique<BondCriterion>(release_parts(parts_), asked_of(parts_), parts_.damage, terms_, parts_.skip);
-    BondScreen* const screen = criterion->screen();
-    // All of them or none.
-    if (screen && std::ranges::all_of(terms_, [&](const auto& term) { return term->screen(screen); })) criterion_ = criterion.get();
-    if (criterion_) criterion_->forces_mark();
-    for (const auto& term : terms_)
-      if (!criterion_) term->screen(nullptr);
+    if (BondScreen* const screen = criterion->screen()) {
+      for (const auto& term : terms_)
+        if (BreakableTerm* const bonds = term->breakable()) bonds->screen(screen);
+      criterion_ = criterion.get();
+      criterion_->forces_mark();
+    }
     finder = std::move(criterion);
   }
   failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}});
@@ -155,26 +184,58 @@ EvaluationStatus Terms::status(std::int64_t bad) const {
   return status;
 }
 
-/// add(term, energy) adds the forces of a term to `force`, which is zero.
-template <class Add>
-EvaluationStatus Terms::forces_by(Add&& add, ConstFieldView u, double* energy) {
-  ExactSum sum;
-  if (criterion_) criterion_->begin_forces();
+template <class Visit>
+EvaluationStatus Terms::each_term(Visit&& visit) {
   std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = add(**term, energy ? &sum : nullptr);
-  if (criterion_ && bad < 0) criterion_->end_forces(u);
-  if (energy) *energy = total_over_ranks(sum);
+  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = visit(**term);
   return status(bad);
 }
 
-EvaluationStatus Terms::forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival, PointMotion* motion) {
-  if (!motion) fill(0, force);
-  return forces_by(
-      [&](Term& term, ExactSum* to) {
-        if (motion && motion->pending()) return term.move_and_add_forces(*motion, u, force, to);
-        return arrival && arrival->pending() ? term.add_forces_meanwhile(*arrival, u, force, to) : term.add_forces(u, force, to);
-      },
-      u, energy);
+int Terms::coupling_reach() const {
+  int reach = 1;
+  for (const auto& term : terms_)
+    if (const AssembledTerm* const assembled = term->assembled()) reach = std::max(reach, assembled->coupling_reach());
+  return reach;
+}
+
+StatefulTerm* Terms::stateful() const noexcept { return terms_.front()->stateful(); }
+
+std::size_t Terms::groups() const noexcept { return parts_.families->body().stride() / padding; }
+
+void Terms::add_owned(const std::vector<GroupEnergy>& energies, double GroupEnergy::* which, ExactSum& sum) const {
+  const Body& body = parts_.families->body();
+  for (std::size_t g = 0; g < energies.size(); ++g)
+    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
+      if (!body.alive(p)) continue;
+      if (body.owns(p)) sum.add(energies[g].*which);   // groups are of one rank's points
+      break;
+    }
+}
+
+/// add(term, sum) adds the forces of a term to `force`, which is zero.
+template <class Add>
+EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView force, double* energy) {
+  if (criterion_) criterion_->begin_forces();
+  ExactSum stored;
+  std::int64_t bad = -1;
+  for (std::size_t t = 0; t < terms_.size() && bad < 0; ++t) {
+    const StatefulTerm* const remembers = terms_[t]->stateful();
+    const bool dissipates = remembers && remembers->dissipates() && at.time_step() > 0;
+    if (energy || dissipates) energies_[t].assign(groups(), {});
+    bad = add(*terms_[t], ForceSum{force, energy || dissipates ? std::span(energies_[t]) : std::span<GroupEnergy>(), energy != nullptr});
+    if (energy) add_owned(energies_[t], &GroupEnergy::stored, stored);
+    if (!dissipates) continue;
+    dissipated_ = {};
+    add_owned(energies_[t], &GroupEnergy::dissipated, dissipated_);
+  }
+  if (criterion_ && bad < 0) criterion_->end_forces(at.u());
+  if (energy) *energy = total_over_ranks(stored);
+  return status(bad);
+}
+
+EvaluationStatus Terms::forces(const Configuration& at, FieldView force, double* energy) {
+  if (!at.motion()) fill(0, force);
+  return forces_by([&](Term& term, const ForceSum& sum) { return term.forces(at, {}, sum); }, at, force, energy);
 }
 
 namespace {
@@ -187,39 +248,51 @@ void begin_samples(const Body& body, PointSamples& samples) {
 
 }  // namespace
 
-EvaluationStatus Terms::forces_and_samples(ConstFieldView u, FieldView force, double* energy, PointSamples& samples) {
+EvaluationStatus Terms::forces_and_samples(const Configuration& at, FieldView force, double* energy, PointSamples& samples) {
   begin_samples(parts_.families->body(), samples);
   fill(0, force);
-  return forces_by([&](Term& term, ExactSum* to) { return term.add_forces_and_samples(u, force, to, samples); }, u, energy);
+  return forces_by(
+      [&](Term& term, const ForceSum& sum) {
+        SampledTerm* const sampled = term.sampled();
+        return sampled ? sampled->forces_and_samples(at, sum, samples) : term.forces(at, {}, sum);
+      },
+      at, force, energy);
 }
 
-EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
+EvaluationStatus Terms::renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
                                      FieldView force, double* energy) {
-  if (!failing_ || !parts_.skip || history()) return forces(u, force, energy);
+  if (!failing_ || !parts_.skip || history()) return forces(at, force, energy);
   const Families& families = *parts_.families;
   const Body& body = families.body();
-  int steps = 1;
-  for (const auto& term : terms_) steps = std::max(steps, term->coupling_reach());
+  const int steps = coupling_reach(), reach = std::max(1, steps - 1);   // the latter of the evaluation points at a point
   const auto around = [&](GroupMarks marks, int times) {
     for (int k = 0; k < times; ++k) marks = families.around(marks);
     return marks;
   };
-  const int reach = std::max(1, steps - 1);   // of the evaluation points at a point
   GroupMarks renewed = around(families.marks_of(lost), reach);
   add(renewed, around(families.marks_of(moved), steps));
   GroupMarks only = around(renewed, reach), complete;
   if (energy) {
     complete = renewed;
-    for (const auto& term : terms_) term->complete(complete);
+    for (const auto& term : terms_)
+      if (const BreakableTerm* const bonds = term->breakable()) bonds->complete(complete);
     add(only, complete);
   }
-  if (2 * count(only) > body.internal().size()) return forces(u, force, energy);
+  if (2 * count(only) > body.internal().size()) return forces(at, force, energy);
   const GroupMarks near = families.around(only);
   const FieldView own = failing_->work(force, body);
   ExactSum sum;
+  std::vector<GroupEnergy> anew;
   std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
-    bad = energy ? (*term)->renew_forces(u, only, complete, near, own, sum) : (*term)->add_forces_of(u, only, near, own, nullptr);
+  for (std::size_t t = 0; t < terms_.size() && bad < 0; ++t) {
+    if (energy) anew.assign(groups(), {});
+    bad = terms_[t]->forces(at.moved_to(at.u()), {&only, &near}, {own, anew});
+    if (!energy) continue;
+    // The energies of the groups that are complete take the place of those that they had: the sum is bit for bit that of all forces.
+    for (std::size_t g = 0; g < anew.size(); ++g)
+      if (complete[g]) energies_[t][g] = anew[g];
+    add_owned(energies_[t], &GroupEnergy::stored, sum);
+  }
   if (energy) *energy = total_over_ranks(sum);
   for (std::size_t g = 0; g < renewed.size(); ++g)
     for (int c = 0; c < force.components && renewed[g]; ++c)
@@ -229,11 +302,10 @@ EvaluationStatus Terms::renew_forces(ConstFieldView u, std::span<const std::int3
   return status(bad);
 }
 
-EvaluationStatus Terms::tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) {
+EvaluationStatus Terms::tangent(const Configuration& at, ConstFieldView w, FieldView Kw, const GroupRings* rings) {
   fill(0, Kw);
-  std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_tangent(u, w, Kw);
-  return status(bad);
+  const Region region = rings ? Region{&rings->only, &rings->near} : Region{};
+  return each_term([&](Term& term) { return term.tangent(at, w, region, Kw); });
 }
 
 namespace {
@@ -265,42 +337,37 @@ GroupRings Terms::near_failed_bonds() const {
   for (std::size_t p = 0; p < rings.inside.size(); ++p)
     if (rings.inside[p]) points.push_back(static_cast<std::int32_t>(p));
   rings.only = families.marks_of(points);
-  int steps = 2;
-  for (const auto& term : terms_) steps = std::max(steps, term->coupling_reach());
-  for (int k = 1; k < steps; ++k) rings.only = families.around(rings.only);
+  for (int k = 1; k < std::max(2, coupling_reach()); ++k) rings.only = families.around(rings.only);
   rings.near = families.around(rings.only);
   return rings;
 }
 
-EvaluationStatus Terms::tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw) {
-  fill(0, Kw);
-  std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term)
-    bad = (*term)->add_tangent_of(u, w, groups.only, groups.near, Kw);
-  return status(bad);
-}
-
-EvaluationStatus Terms::sample(ConstFieldView u, PointSamples& samples) {
+EvaluationStatus Terms::sample(const Configuration& at, PointSamples& samples) {
   begin_samples(parts_.families->body(), samples);
-  std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = (*term)->add_samples(u, samples);
-  return status(bad);
+  return each_term([&](Term& term) {
+    SampledTerm* const sampled = term.sampled();
+    return sampled ? sampled->sample(at, samples) : -1;
+  });
 }
 
-std::unique_ptr<VolumetricRows> Terms::volumetric_rows() const { return mechanics_ ? mechanics_->make_volumetric_rows() : nullptr; }
+std::unique_ptr<VolumetricRows> Terms::volumetric_rows() const {
+  AssembledTerm* const assembled = terms_.front()->assembled();
+  return assembled ? assembled->make_volumetric_rows() : nullptr;
+}
 
 Terms::Assemblies& Terms::assemblies() {
   if (!assemblies_) {
     assemblies_ = std::make_unique<Assemblies>(Assemblies{BlockRows(*parts_.families), {}, parts_.families->version()});
     for (const auto& term : terms_) {
-      assemblies_->all.push_back(term->make_assembly(assemblies_->rows));
-      assemblies_->steps = std::max(assemblies_->steps, term->coupling_reach());
+      const AssembledTerm* const assembled = term->assembled();
+      assemblies_->all.push_back(assembled ? assembled->make_assembly(assemblies_->rows) : std::make_unique<PointBlocks>(*term, assemblies_->rows));
     }
+    assemblies_->steps = coupling_reach();
   }
   return *assemblies_;
 }
 
-EvaluationStatus Terms::assemble(ConstFieldView u, BlockMatrix& K) {
+EvaluationStatus Terms::assemble(const Configuration& at, BlockMatrix& K) {
   Assemblies& own = assemblies();
   if (own.version != parts_.families->version()) {
     for (const auto& assembly : own.all) assembly->bonds_changed();
@@ -309,7 +376,7 @@ EvaluationStatus Terms::assemble(ConstFieldView u, BlockMatrix& K) {
   if (!K.has_pattern()) make_pattern(own.rows, own.steps, K);
   fill(0, {K.values.data(), K.values.size(), 1});
   std::int64_t bad = -1;
-  for (auto assembly = own.all.begin(); assembly != own.all.end() && bad < 0; ++assembly) bad = (*assembly)->add(u, K);
+  for (auto assembly = own.all.begin(); assembly != own.all.end() && bad < 0; ++assembly) bad = (*assembly)->add(at, K);
   return status(bad);
 }
 
@@ -328,35 +395,24 @@ Field Terms::shape_tensor_condition() const {
 
 Field Terms::damage() const { return damage_field(*parts_.families); }
 
-RestingCounts Terms::resting_counts() const {
-  RestingCounts counts;
-  for (const auto& term : terms_) {
-    const RestingCounts of_term = term->resting_counts();
-    counts.blocks += of_term.blocks;
-    counts.quiet += of_term.quiet;
-  }
-  return counts;
-}
-
-LawHistory* Terms::history() const noexcept { return mechanics_ ? mechanics_->history() : nullptr; }
+LawHistory* Terms::history() const noexcept { return stateful() ? &stateful()->history() : nullptr; }
 
 void Terms::history_restored() {
-  if (mechanics_) mechanics_->history_restored();
+  if (stateful()) stateful()->history_restored();
 }
 
-std::vector<HistoryPlace> Terms::history_points() const {
-  return history() ? mechanics_->history_points() : std::vector<HistoryPlace>();
-}
+std::vector<HistoryPlace> Terms::history_points() const { return stateful() ? stateful()->history_points() : std::vector<HistoryPlace>(); }
 
-double Terms::take_dissipated() { return mechanics_ ? total_over_ranks(mechanics_->take_dissipated()) : 0; }
+double Terms::take_dissipated() { return total_over_ranks(std::exchange(dissipated_, {})); }
 
 void Terms::bonds_changed(std::span<const std::int32_t> points) {
-  for (const auto& term : terms_) term->bonds_changed(points);
+  for (const auto& term : terms_)
+    if (BreakableTerm* const bonds = term->breakable()) bonds->bonds_changed(points);
 }
 
-BondUpdate Terms::update_bonds(ConstFieldView u, double time_step, const StepInside& step) {
+BondUpdate Terms::update_bonds(const Configuration& at, const StepInside& step) {
   if (!failing_) return {};
-  BondUpdate update = failing_->fracture.update(u, time_step, step, failing_->body(*this));
+  BondUpdate update = failing_->fracture.update(at, step, failing_->body(*this));
   failing_->ends = update.ends;
   return update;
 }
@@ -365,53 +421,59 @@ bool Terms::settling() const noexcept { return failing_ && failing_->fracture.se
 
 void Terms::let_others_forecast(bool to_others) { failing_->fracture.let_others_forecast(to_others); }
 
-EvaluationStatus Terms::weakening_forces(ConstFieldView u, ConstFieldView w, FieldView force) {
-  if (failing_->fracture.add_weakening(u, w, force, failing_->body(*this))) return {};
+EvaluationStatus Terms::weakening_forces(const Configuration& at, ConstFieldView w, FieldView force) {
+  if (failing_->fracture.add_weakening(at, w, force, failing_->body(*this))) return {};
   return {.description = "near bonds that weaken"};
 }
 
-BondUpdate Terms::weaken_bonds(ConstFieldView u, ConstFieldView forecast) { return failing_->fracture.weaken(u, forecast, failing_->body(*this)); }
+BondUpdate Terms::weaken_bonds(const Configuration& at, ConstFieldView forecast) { return failing_->fracture.weaken(at, forecast, failing_->body(*this)); }
 
 /// What those who change bonds need of the terms. As long as it lives, before and after bonds fail, the same groups are asked for.
 Fracture::Body Terms::Failing::body(Terms& terms) {
   const Families& families = *terms.parts_.families;
-  const auto forces = [this, &terms, &families, last = GroupMarks(), near = GroupMarks()](
-                          ConstFieldView at, const GroupMarks& marks, double factor, FieldView sum) mutable {
-    const FieldView own = work(at, families.body());
+  // Forces of the region to the work field, their energy over all ranks; not a number where a point is inadmissible. No step ends: nothing is kept.
+  const auto evaluate = [this, &terms, &families](const Configuration& at, const GroupMarks& marks, const GroupMarks& near) {
+    const FieldView own = work(at.u(), families.body());
     ExactSum energy;
+    std::vector<GroupEnergy> energies;
+    std::int64_t bad = -1;
+    for (const auto& term : terms.terms_) {
+      energies.assign(terms.groups(), {});
+      bad = std::max(bad, term->forces(at.moved_to(at.u()), {&marks, &near}, {own, energies}));
+      terms.add_owned(energies, &GroupEnergy::stored, energy);
+    }
+    const bool ok = communicator().largest(bad >= 0 ? 1 : 0) == 0;
+    return ok ? total_over_ranks(energy) : std::numeric_limits<double>::quiet_NaN();
+  };
+  const auto forces = [this, evaluate, &families, last = GroupMarks(), near = GroupMarks()](
+                          const Configuration& at, const GroupMarks& marks, double factor, FieldView sum) mutable {
     if (marks != last) {
       last = marks;
       near = families.around(marks);
     }
-    std::int64_t bad = -1;
-    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, marks, near, own, &energy));
-    const bool ok = communicator().largest(bad >= 0 ? 1 : 0) == 0;
-    take(near, factor, ok ? sum : FieldView{});
-    return ok ? total_over_ranks(energy) : std::numeric_limits<double>::quiet_NaN();
+    const double energy = evaluate(at, marks, near);
+    take(near, factor, std::isfinite(energy) ? sum : FieldView{});
+    return energy;
+  };
+  const auto energy = [this, evaluate, &families](const Configuration& at, const GroupMarks& marks) {
+    const GroupMarks near = families.around(marks);
+    const double energy = evaluate(at, marks, near);
+    take(near, 0, {});
+    return energy;
   };
   const Formulation& f = terms.parts_.formulation;
   const bool owners_alone = !f.dilatation && !(f.bond && f.far_share > 0);
-  const auto energy = [this, &terms, &families](ConstFieldView at, const GroupMarks& marks) {
-    const GroupMarks near = families.around(marks);
-    const FieldView own = work(at, families.body());
-    ExactSum sum;
-    std::int64_t bad = -1;
-    for (const auto& term : terms.terms_) bad = std::max(bad, term->add_forces_of(at, marks, near, own, &sum));
-    take(near, 0, {});
-    if (communicator().largest(bad >= 0 ? 1 : 0) > 0) return std::numeric_limits<double>::quiet_NaN();
-    return total_over_ranks(sum);
-  };
   return {forces, energy, owners_alone, [&terms](std::span<const std::int32_t> points) { terms.bonds_changed(points); }};
 }
 
-std::vector<BondEnergy> Terms::bond_energies(ConstFieldView u) {
-  return BondCriterion(release_parts(parts_), {.energy = true}, nullptr, terms_, parts_.skip).energies(u);
+std::vector<BondEnergy> Terms::bond_energies(const Configuration& at) {
+  return BondCriterion(release_parts(parts_), {.energy = true}, nullptr, terms_, parts_.skip).energies(at);
 }
 
-std::vector<BondEnergy> Terms::released_energies(ConstFieldView u) {
+std::vector<BondEnergy> Terms::released_energies(const Configuration& at) {
   if (const char* const reason = BondRelease::unknown(parts_.formulation, parts_.families->body().dimension(), parts_.stabilization != nullptr))
     throw std::logic_error(fmt::format("what bonds set free is not known {}", reason));
-  return BondCriterion(release_parts(parts_), {.energy = true, .released = true}, nullptr, terms_, parts_.skip).energies(u);
+  return BondCriterion(release_parts(parts_), {.energy = true, .released = true}, nullptr, terms_, parts_.skip).energies(at);
 }
 
 std::vector<BondChange> Terms::changed_bonds() const {

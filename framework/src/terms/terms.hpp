@@ -8,26 +8,26 @@
 #include <vector>
 
 #include "families/bonds.hpp"
-#include "families/resting_counts.hpp"
 #include "families/step_inside.hpp"
 #include "model/formulation.hpp"
+#include "operators/group_energy.hpp"
 #include "operators/law_history.hpp"
 #include "operators/report.hpp"
 #include "operators/samples.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
+#include "perikit/core/exact_sum.hpp"
+#include "perikit/model/configuration.hpp"
 #include "perikit/model/stabilization.hpp"
 #include "perikit/operators/laws.hpp"
 
 namespace perikit {
 
-class Arrival;
 class BondCriterion;
 class Families;
-class Mechanics;
-class PointMotion;
 struct CloudConsistency;
 struct Interfaces;
+class StatefulTerm;
 class Term;
 class VolumetricRows;
 
@@ -60,31 +60,29 @@ class Terms {
   explicit Terms(TermParts parts);
   ~Terms();
 
-  /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted. arrival: of u at the
-  /// points of other ranks, which has come when it returns; null: it is there. motion: of u, which leaves force zero.
-  EvaluationStatus forces(ConstFieldView u, FieldView force, double* energy, Arrival* arrival = nullptr, PointMotion* motion = nullptr);
-  /// `forces` and `sample` of the same displacements, bit for bit; where evaluation points are those of both, each is visited once.
-  EvaluationStatus forces_and_samples(ConstFieldView u, FieldView force, double* energy, PointSamples& samples);
-  /// The same where `force` holds the forces before the points `moved` went to where u has them and those of `lost` lost bonds:
+  /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted. Displacements that are on their way have
+  /// come when it returns; a motion of the configuration leaves force zero.
+  EvaluationStatus forces(const Configuration& at, FieldView force, double* energy);
+  /// `forces` and `sample` of the same configuration, bit for bit; where evaluation points are those of both, each is visited once.
+  EvaluationStatus forces_and_samples(const Configuration& at, FieldView force, double* energy, PointSamples& samples);
+  /// The same where `force` holds the forces before the points `moved` went to where they are now and those of `lost` lost bonds:
   /// what has not changed is left as it is, what has has the same bits. With an energy, those forces must have come with theirs.
   /// On one rank.
-  EvaluationStatus renew_forces(ConstFieldView u, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
+  EvaluationStatus renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
                                 FieldView force, double* energy);
   /// The points whose bonds failed or weakened in the last update, on any number of ranks the same; empty where none did, or where
   /// their families are left with so much that their gradients are no stiffer than before.
   GroupRings near_failed_bonds() const;
-  /// The tangent of those points alone: Kw <- -d(force)/du w [N] on their points, bit for bit as `tangent` has it, where w is 0 on all others;
-  /// anything elsewhere.
-  EvaluationStatus tangent_of(const GroupRings& groups, ConstFieldView u, ConstFieldView w, FieldView Kw);
-  /// Kw <- -d(force)/du w [N], fully overwritten.
-  EvaluationStatus tangent(ConstFieldView u, ConstFieldView w, FieldView Kw);
+  /// Kw <- -d(force)/du w [N], fully overwritten. Of rings those of their points alone, bit for bit the same, where w is 0 on all others; anything
+  /// elsewhere.
+  EvaluationStatus tangent(const Configuration& at, ConstFieldView w, FieldView Kw, const GroupRings* rings = nullptr);
   /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
   /// from these terms and stays as it is. Values are overwritten; undefined after a failure.
-  EvaluationStatus assemble(ConstFieldView u, BlockMatrix& K);
+  EvaluationStatus assemble(const Configuration& at, BlockMatrix& K);
   /// What `assemble` would take, before it takes it: blocks counted in at most 256 rows spread over the body; exact for bodies with
   /// no more points.
   AssembledSize assembled_size();
-  EvaluationStatus sample(ConstFieldView u, PointSamples& samples);
+  EvaluationStatus sample(const Configuration& at, PointSamples& samples);
   /// The volumetric part of the tangent where the map is selective, else null. The terms must outlive it.
   std::unique_ptr<VolumetricRows> volumetric_rows() const;
   /// That evaluation met this inadmissible point (field index), or none (-1).
@@ -101,7 +99,6 @@ class Terms {
   /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
   Field damage() const;
   ModelReport report() const;
-  RestingCounts resting_counts() const;
   /// Of laws that have one, at the evaluation points; else null. After its values were replaced: history_restored.
   LawHistory* history() const noexcept;
   void history_restored();
@@ -111,23 +108,23 @@ class Terms {
   double take_dissipated();
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
-  /// Lowers the integrity of bonds that are beyond their limit at u, and recomputes what depends on them. To be called after
-  /// every step, with its length [s] (0 in quasi-static runs). Where `step` is given, bonds fail inside of it, and u follows what it does.
-  BondUpdate update_bonds(ConstFieldView u, double time_step = 0, const StepInside& step = {});
+  /// Lowers the integrity of bonds that are beyond their limit, and recomputes what depends on them. To be called after
+  /// every step. Where `step` is given, bonds fail inside of it, and displacements follow what it does.
+  BondUpdate update_bonds(const Configuration& at, const StepInside& step = {});
   // Bonds that weakened in the last update outside of a step: see WeakeningBonds.
   /// Whether some of them may be forecast.
   bool settling() const noexcept;
   /// Whether somebody else forecasts how far bonds weaken; else updates do.
   void let_others_forecast(bool to_others);
-  /// force <- force + df/db (db/du . w) at u, the displacement of that update.
-  EvaluationStatus weakening_forces(ConstFieldView u, ConstFieldView w, FieldView force);
-  /// Lowers them to what they are at `forecast`, and not by more than half; energies are those at u.
-  BondUpdate weaken_bonds(ConstFieldView u, ConstFieldView forecast);
-  /// The shares of all bonds in the energy at u: they add up to it. Ascending. Not where laws have a history.
-  std::vector<BondEnergy> bond_energies(ConstFieldView u);
+  /// force <- force + df/db (db/du . w) at the displacement of that update.
+  EvaluationStatus weakening_forces(const Configuration& at, ConstFieldView w, FieldView force);
+  /// Lowers them to what they are at `forecast`, and not by more than half; energies are those of `at`.
+  BondUpdate weaken_bonds(const Configuration& at, ConstFieldView forecast);
+  /// The shares of all bonds in the energy: they add up to it. Ascending. Not where laws have a history.
+  std::vector<BondEnergy> bond_energies(const Configuration& at);
   /// dE/db_ij of all bonds with displacements held. Ascending. Throws std::logic_error for kinematics of which it is not known (see
   /// DamageTraits::released).
-  std::vector<BondEnergy> released_energies(ConstFieldView u);
+  std::vector<BondEnergy> released_energies(const Configuration& at);
   /// Every bond here that is not as it was at the set-up.
   std::vector<BondChange> changed_bonds() const;
   void restore_bonds(std::span<const BondChange> changes);
@@ -139,7 +136,16 @@ class Terms {
 
  private:
   template <class Add>
-  EvaluationStatus forces_by(Add&& add, ConstFieldView u, double* energy);
+  EvaluationStatus forces_by(Add&& add, const Configuration& at, FieldView force, double* energy);
+  /// visit(term) until one returns an inadmissible point.
+  template <class Visit>
+  EvaluationStatus each_term(Visit&& visit);
+  int coupling_reach() const;
+  StatefulTerm* stateful() const noexcept;
+  std::size_t groups() const noexcept;
+  /// sum += those that this rank owns.
+  void add_owned(const std::vector<GroupEnergy>& energies, double GroupEnergy::* which, ExactSum& sum) const;
+  class PointBlocks;
   struct Assemblies;
   struct Failing;
   void bonds_changed(std::span<const std::int32_t> points);
@@ -147,7 +153,8 @@ class Terms {
 
   TermParts parts_;
   std::vector<std::unique_ptr<Term>> terms_;
-  Mechanics* mechanics_ = nullptr;          ///< one of them, but for pair laws
+  std::vector<std::vector<GroupEnergy>> energies_;  ///< by term, of the last evaluation that asked for them
+  ExactSum dissipated_;                             ///< in the step that the last evaluation of forces ended
   std::unique_ptr<Assemblies> assemblies_;  ///< made when asked for
   std::unique_ptr<Failing> failing_;        ///< null without [damage]
   BondCriterion* criterion_ = nullptr;      ///< of failing_, where evaluations of forces tell it which bonds need a look

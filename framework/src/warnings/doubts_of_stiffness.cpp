@@ -58,7 +58,7 @@ std::optional<Field> energy_of(BodyProblem& problem, const std::function<Point(c
   }
   PointSamples samples;
   samples.asked = Sampling::energy;
-  const bool admissible = problem.terms().sample(u, samples).ok();
+  const bool admissible = problem.terms().sample({u, 0}, samples).ok();
   if (communicator().largest(admissible ? 0 : 1) > 0) return {};
   return std::move(samples.strain_energy_density);
 }

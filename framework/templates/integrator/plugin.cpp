@@ -96,7 +96,7 @@ class PartName final : public Integrator {
       check_time_step(problem, values_, &observer);
       count = steps(problem);
       constraints.prescribe_velocity(state.time, v);
-      evaluate(problem, observer.wants_sample(0, state.time), end_time_ / count);
+      evaluate(problem, observer.wants_sample(0, state.time), end_time_ / count, v);
       std::copy_n(v.data, v.size(), half.data);
       observer.step_done(report());
     }
@@ -110,7 +110,7 @@ class PartName final : public Integrator {
       state.time = t_next;
       ++state.step;
       const bool sample = observer.wants_sample(state.step, t_next);
-      evaluate(problem, sample, dt);
+      evaluate(problem, sample, dt, half);
       work.end(dt, half);
       last_dt = dt;
       if (sample) {   // velocities at full steps are only wanted here
@@ -129,10 +129,10 @@ class PartName final : public Integrator {
     return std::max(1.0, std::ceil(end_time_ / dt * (1 - 1e-12)));
   }
 
-  static void evaluate(Problem& problem, bool energy, double dt) {
+  static void evaluate(Problem& problem, bool energy, double dt, ConstFieldView half_step_velocity) {
     State& state = problem.state();
     double* const strain = energy ? &state.energies.strain : nullptr;
-    const EvaluationStatus status = problem.evaluate_forces(state.displacement(), state.internal_force(), strain, dt);
+    const EvaluationStatus status = problem.evaluate_forces({state.displacement(), state.time, dt, half_step_velocity}, state.internal_force(), strain);
     if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", state.step, state.time, status.description));
   }
 

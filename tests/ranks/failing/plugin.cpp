@@ -22,14 +22,14 @@ class Failing final : public Integrator {
   IntegratorTraits traits() const noexcept override { return {.several_ranks = true}; }
   std::string plan(Problem& problem) override {
     fail_at("plan");
-    (void)problem.evaluate_forces(problem.state().displacement(), problem.state().internal_force(), nullptr);
+    (void)problem.evaluate_forces({problem.state().displacement(), 0}, problem.state().internal_force(), nullptr);
     return "ten evaluations";
   }
   void run(Problem& problem, Observer& observer) override {
     State& state = problem.state();
     for (; state.step < 10; ++state.step) {
       if (state.step == 5) fail_at("step");
-      (void)problem.evaluate_forces(state.displacement(), state.internal_force(), nullptr);
+      (void)problem.evaluate_forces({state.displacement(), 0}, state.internal_force(), nullptr);
       observer.wants_sample(state.step, 0.0);
       StepReport report;
       report.step = state.step;

@@ -3,6 +3,7 @@
 
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/core/field.hpp"
+#include "perikit/model/configuration.hpp"
 
 namespace perikit {
 
@@ -13,9 +14,9 @@ class DamagedPart {
   virtual ~DamagedPart() = default;
   /// 1 on the components of its points, 0 elsewhere.
   virtual ConstFieldView inside() const = 0;
-  /// Kw <- -d(force)/du . w at u [N] on its points, bit for bit as Problem::tangent_action has it, of a w that is 0 on all others; anything
+  /// Kw <- -d(force)/du . w [N] on its points, bit for bit as Problem::tangent_action has it, of a w that is 0 on all others; anything
   /// elsewhere.
-  virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
+  virtual EvaluationStatus tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) = 0;
 };
 
 }  // namespace perikit

@@ -7,7 +7,7 @@
 
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
-#include "perikit/core/point_motion.hpp"
+#include "perikit/model/configuration.hpp"
 #include "perikit/problem/constraints.hpp"
 #include "perikit/problem/damaged_part.hpp"
 #include "perikit/problem/image_map.hpp"
@@ -49,6 +49,8 @@ class Problem {
   const Loads& loads() const noexcept { return values_.loads; }
   const ImageMap* images() const noexcept { return values_.images; }
   int dimension() const noexcept { return body().dimension(); }
+  /// That of the state: its displacements at its time.
+  Configuration configuration() const noexcept { return {values_.state.displacement(), values_.state.time}; }
   /// A new field of `dimension` components, zero, with the margins that the operations need: theirs must all come from here.
   Field make_field() const { return body().make_field(dimension()); }
 
@@ -56,27 +58,21 @@ class Problem {
   /// ghosts are zero. All ranks must call it.
   virtual void share(FieldView field) = 0;
 
-  /// force <- internal forces f(u) [N]; strain energy -> *energy where wanted. time_step > 0 [s]: u ends a step of this length, and
-  /// laws with history put theirs aside for `advance`; 0: nothing is kept.
-  virtual EvaluationStatus evaluate_forces(ConstFieldView u, FieldView force, double* energy, double time_step = 0) = 0;
-  /// The same of the displacements u that `motion` makes. It also sets force to zero on the points that it moves. All have moved when this returns.
-  virtual EvaluationStatus move_and_evaluate_forces(PointMotion& motion, ConstFieldView u, FieldView force, double* energy, double time_step) {
-    motion.finish();
-    return evaluate_forces(u, force, energy, time_step);
-  }
-  /// force <- what acts from outside at time (or load parameter) t [N], fully overwritten: loads, of which some follow the
-  /// surface at u.
-  virtual EvaluationStatus external_forces(ConstFieldView u, double t, FieldView force) = 0;
+  /// force <- internal forces [N]; strain energy -> *energy where wanted. Where a motion of the configuration makes the displacements, all points have moved
+  /// when it returns, and it need not find force zero on those that move.
+  virtual EvaluationStatus evaluate_forces(const Configuration& at, FieldView force, double* energy) = 0;
+  /// force <- what acts from outside [N], fully overwritten: loads, of which some follow the surface.
+  virtual EvaluationStatus external_forces(const Configuration& at, FieldView force) = 0;
   /// Kw <- Kw - d(external force)/du . w, of loads that follow the surface: exact but for plane and line stress, where the
   /// thickness comes in by differences. Assembled tangents leave it out.
-  virtual EvaluationStatus add_load_stiffness(ConstFieldView u, double t, ConstFieldView w, FieldView Kw) = 0;
-  /// Kw <- dF/du . w at u, exact; K = -d(force)/du, so that Kw is the stiffness times w [N].
-  virtual EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) = 0;
-  /// K <- -d(force)/du at u [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K
+  virtual EvaluationStatus add_load_stiffness(const Configuration& at, ConstFieldView w, FieldView Kw) = 0;
+  /// Kw <- dF/du . w, exact; K = -d(force)/du, so that Kw is the stiffness times w [N].
+  virtual EvaluationStatus tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) = 0;
+  /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K
   /// has must come from this problem. Values are overwritten; undefined after a failure. Points at bonds that have failed are
   /// held by 1e-9 of the mean stiffness of a point: pieces that nothing else holds then stay where they are, and K is not
   /// singular.
-  virtual EvaluationStatus assemble_tangent(ConstFieldView u, BlockMatrix& K) = 0;
+  virtual EvaluationStatus assemble_tangent(const Configuration& at, BlockMatrix& K) = 0;
   /// What assemble_tangent would take, at little cost: for refusing before the memory runs out.
   virtual AssembledSize assembled_size() = 0;
   /// K <- the stiffness at u of springs between nearest neighbours with the moduli of the body [N/m]: symmetric, cheap, spectrally

@@ -27,6 +27,8 @@ class Equilibrium {
 
   Problem& problem() noexcept { return problem_; }
   double parameter() const noexcept { return t_; }
+  /// Displacements u at the present load parameter.
+  Configuration at(ConstFieldView u) const noexcept { return {u, t_}; }
   double tolerance() const noexcept { return tolerance_; }
   /// Start values of the solver, then its answer [m]; suited for Problem::evaluate_forces. Prescribed components are those of the
   /// start until `impose`.

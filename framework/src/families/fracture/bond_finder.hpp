@@ -8,18 +8,18 @@
 #include "families/bonds.hpp"
 #include "families/family_arrays.hpp"
 #include "perikit/body/body.hpp"
-#include "perikit/core/field.hpp"
+#include "perikit/model/configuration.hpp"
 
 namespace perikit {
 
 class BondFinder {
  public:
   virtual ~BondFinder() = default;
-  /// Bonds whose integrity is lower at u than it is now, in a fixed order. To be called in every step.
-  virtual std::vector<BondChange> find(ConstFieldView u) = 0;
-  /// values[k] <- what the criterion compares with the limits of bonds[k], which are as they are now. u: any displacement; with
+  /// Bonds whose integrity is lower here than it is now, in a fixed order. To be called in every step.
+  virtual std::vector<BondChange> find(const Configuration& at) = 0;
+  /// values[k] <- what the criterion compares with the limits of bonds[k], which are as they are now. Anywhere; with
   /// the very field of the last `find`, unchanged since, they are known.
-  virtual void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) = 0;
+  virtual void values(std::span<const BondId> bonds, const Configuration& at, std::span<double> values) = 0;
   /// Forgets what it knows of bonds that are far from failing: bonds were restored.
   virtual void forget() noexcept = 0;
   /// Groups of eight points that could be looked at in each step, and how many were in all of them.

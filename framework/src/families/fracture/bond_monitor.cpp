@@ -29,7 +29,8 @@ double bond_stretch(const FamilyArrays& family, std::size_t k, std::size_t point
   return change / (std::sqrt(length * length + change) + length) / length;
 }
 
-void BondMonitor::values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) {
+void BondMonitor::values(std::span<const BondId> bonds, const Configuration& at, std::span<double> values) {
+  const ConstFieldView u = at.u();
   for (std::size_t k = 0; k < bonds.size(); ++k) values[k] = bond_stretch(body_, u, bonds[k]);
 }
 
@@ -43,7 +44,8 @@ void BondMonitor::set_cells(std::vector<Group> groups, std::vector<std::size_t> 
   checks_.assign(cells(), 0);
 }
 
-std::vector<BondChange> BondMonitor::find(ConstFieldView u) {
+std::vector<BondChange> BondMonitor::find(const Configuration& at) {
+  const ConstFieldView u = at.u();
   const bool known = begin(u) && skip_, all_groups = !skip_ || (renew_ && !known);
   if (all_groups) {
     std::copy_n(u.data, u.size(), reference_.data());

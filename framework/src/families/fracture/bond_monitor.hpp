@@ -32,8 +32,8 @@ struct NearestFailure {
 
 class BondMonitor : public BondFinder {
  public:
-  std::vector<BondChange> find(ConstFieldView u) override;
-  void values(std::span<const BondId> bonds, ConstFieldView u, std::span<double> values) override;
+  std::vector<BondChange> find(const Configuration& at) override;
+  void values(std::span<const BondId> bonds, const Configuration& at, std::span<double> values) override;
   void forget() noexcept override { renew_ = true; }
   std::size_t groups() const noexcept override { return groups_.size(); }
   std::size_t checked() const noexcept override { return checked_; }

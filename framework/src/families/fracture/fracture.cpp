@@ -36,7 +36,7 @@ Fracture::Fracture(Families& families, const BodyDamage& damage, std::unique_ptr
   if (damage.gradual()) gradual_.emplace(families.body(), damage.crack_speed);
 }
 
-std::vector<Fracture::Found> Fracture::found(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u) {
+std::vector<Fracture::Found> Fracture::found(std::span<const BondChange> changes, ConstFieldView before, const Configuration& at) {
   std::vector<Found> all;
   // Bonds that let go in the course of steps, or weaken, do so all through the step.
   for (const BondChange& change : changes) all.push_back({change, 0.5, 1});
@@ -48,8 +48,8 @@ std::vector<Fracture::Found> Fracture::found(std::span<const BondChange> changes
   for (const BondChange& change : changes)
     if (!share || families_.body().owns(static_cast<std::size_t>(change.bond.point))) bonds.push_back(change.bond);
   std::vector<double> start(bonds.size()), end(bonds.size()), moments(bonds.size(), 0.5), excesses(bonds.size());
-  if (inside) finder_->values(bonds, before, start);
-  finder_->values(bonds, u, end);
+  if (inside) finder_->values(bonds, at.moved_to(before), start);
+  finder_->values(bonds, at, end);
   // Energies grow with the square of what the bonds do.
   const bool square = damage_.law->traits().energy;
   const auto linear = [&](double value) { return square ? std::copysign(std::sqrt(std::abs(value)), value) : value; };
@@ -106,11 +106,13 @@ Fracture::Ties Fracture::ties(std::span<const Found> found) const {
   return ties;
 }
 
-BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepInside& step, const Body& body) {
+BondUpdate Fracture::update(const Configuration& at, const StepInside& step, const Body& body) {
+  const ConstFieldView u = at.u();
+  const double time_step = at.time_step();
   ++updates_;
   weakening_.clear();
   settling_.clear();
-  std::vector<BondChange> changes = finder_->find(u);
+  std::vector<BondChange> changes = finder_->find(at);
   // Ranks see what bonds of their own points hold, but all must know which bonds fail.
   if (shared_.part() && !damage_.by_stretch() && on_any_rank(!changes.empty())) changes = shared_.of_all(changes);
   if (gradual_) changes = gradual_->let_go(changes, time_step);
@@ -129,14 +131,14 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepInside
           if (change.integrity > 0) weakening_.push_back(change.bond);
       }
     }
-    fail(found(changes, {}, u), u, {}, body, update);
+    fail(found(changes, {}, at), at, {}, body, update);
     finish(update);
     return update;
   }
   if (before_.size() == 0)
     for (Field* field : {&before_, &at_, &force_}) *field = families_.body().make_field(u.components);
   step.begin(before_);
-  const std::vector<Found> all = found(changes, before_, u);
+  const std::vector<Found> all = found(changes, before_, at);
   for (const Found& f : all)
     update.held += f.moment == retry_later && families_.body().owns(static_cast<std::size_t>(f.change.bond.point));
   // Those of each half of the step at the mean of their moments.
@@ -161,7 +163,7 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepInside
     // no moment about other positions.
     const double owed = (moment - 0.5) * time_step, end = early ? 0 : 1;
     if (owed != 0) fill(0.0, force_);
-    fail(of_half, at_, owed != 0 ? FieldView(force_) : FieldView{}, body, update);
+    fail(of_half, at.moved_to(at_), owed != 0 ? FieldView(force_) : FieldView{}, body, update);
     if (owed == 0) continue;
     const double growth = step.act(force_, owed, moment);
     // It works at the velocity of its moment, and in the balance of a step at that of the end of the step that it belongs to. Where the second law
@@ -172,10 +174,10 @@ BondUpdate Fracture::update(ConstFieldView u, double time_step, const StepInside
   return update;
 }
 
-std::vector<double> Fracture::integrities(std::span<const BondId> bonds, ConstFieldView u) {
+std::vector<double> Fracture::integrities(std::span<const BondId> bonds, const Configuration& at) {
   const std::size_t size = padded(bonds.size());
   AlignedVector<double> value(size, 0.0), onset(size, 1.0), failure(size, 1.0), left(size, 1.0);
-  finder_->values(bonds, u, {value.data(), bonds.size()});
+  finder_->values(bonds, at, {value.data(), bonds.size()});
   for (std::size_t k = 0; k < bonds.size(); ++k) {
     const DamageLimits limits = damage_.limits(static_cast<std::size_t>(bonds[k].point), static_cast<std::size_t>(bonds[k].far));
     onset[k] = limits.onset;
@@ -185,16 +187,17 @@ std::vector<double> Fracture::integrities(std::span<const BondId> bonds, ConstFi
   return {left.begin(), left.begin() + static_cast<std::ptrdiff_t>(bonds.size())};
 }
 
-bool Fracture::add_weakening(ConstFieldView u, ConstFieldView w, FieldView force, const Body& body) {
+bool Fracture::add_weakening(const Configuration& at, ConstFieldView w, FieldView force, const Body& body) {
   const double length = largest_magnitude(w);
   if (weakening_.empty() || length < std::numeric_limits<double>::min()) return true;   // the step would be infinite
   // Central differences: points move by the cube root of the rounding unit times the spacing.
   const double step = std::cbrt(std::numeric_limits<double>::epsilon()) * families_.body().spacing() / length;
-  Field at = families_.body().make_field(u.components);
-  combine(1, u, step, w, at);
-  std::vector<double> slope = integrities(weakening_, at);
-  combine(1, u, -step, w, at);
-  const std::vector<double> behind = integrities(weakening_, at);
+  const ConstFieldView u = at.u();
+  Field beside = families_.body().make_field(u.components);
+  combine(1, u, step, w, beside);
+  std::vector<double> slope = integrities(weakening_, at.moved_to(beside));
+  combine(1, u, -step, w, beside);
+  const std::vector<double> behind = integrities(weakening_, at.moved_to(beside));
   double largest = 0;
   for (std::size_t k = 0; k < slope.size(); ++k) {
     slope[k] = (slope[k] - behind[k]) / (2 * step);
@@ -213,15 +216,15 @@ bool Fracture::add_weakening(ConstFieldView u, ConstFieldView w, FieldView force
   std::vector<std::int32_t> ends;
   for (const BondChange& bond : before) ends.insert(ends.end(), {bond.bond.point, bond.bond.far});
   const GroupMarks marks = dependent_on(ends, body);
-  const bool known = std::isfinite(body.forces(u, marks, -1 / change, force));
+  const bool known = std::isfinite(body.forces(at, marks, -1 / change, force));
   body.changed(families_.lower(after));
-  const bool still = std::isfinite(body.forces(u, marks, 1 / change, force));
+  const bool still = std::isfinite(body.forces(at, marks, 1 / change, force));
   body.changed(families_.raise(before));
   return known && still;
 }
 
-BondUpdate Fracture::weaken(ConstFieldView u, ConstFieldView forecast, const Body& body) {
-  const std::vector<double> ahead = integrities(settling_, forecast);
+BondUpdate Fracture::weaken(const Configuration& at, ConstFieldView forecast, const Body& body) {
+  const std::vector<double> ahead = integrities(settling_, at.moved_to(forecast));
   std::vector<BondChange> changes;
   for (std::size_t k = 0; k < settling_.size(); ++k) {
     const double now = families_.integrity(settling_[k]), then = std::max(ahead[k], AitkenAcceleration::least_left * now);
@@ -229,7 +232,7 @@ BondUpdate Fracture::weaken(ConstFieldView u, ConstFieldView forecast, const Bod
   }
   BondUpdate update;
   if (changes.empty()) return update;
-  fail(found(changes, {}, u), u, {}, body, update);
+  fail(found(changes, {}, at), at, {}, body, update);
   finish(update);
   return update;
 }
@@ -252,7 +255,7 @@ GroupMarks Fracture::dependent_on(std::span<const std::int32_t> ends, const Body
   return marks;
 }
 
-void Fracture::fail(std::span<const Found> found, ConstFieldView at, FieldView force, const Body& body, BondUpdate& update) {
+void Fracture::fail(std::span<const Found> found, const Configuration& at, FieldView force, const Body& body, BondUpdate& update) {
   std::vector<BondChange> changes;
   if (!damage_.second_law) {
     for (const Found& f : found) changes.push_back(f.change);
@@ -268,7 +271,7 @@ void Fracture::fail(std::span<const Found> found, ConstFieldView at, FieldView f
 /// Lowers bonds, and those of fragments, where the energy at `at` does not rise, and halves of them where it does. lawful: those
 /// that were; before: their integrities, and those of the fragments' bonds, in the order in which they fell. All ranks must call
 /// it.
-void Fracture::try_to_fail(std::span<const std::vector<BondChange>> ties, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
+void Fracture::try_to_fail(std::span<const std::vector<BondChange>> ties, const Configuration& at, const Body& body, std::vector<BondChange>& lawful,
                            std::vector<BondChange>& before, BondUpdate& update) {
   if (ties.empty()) return;
   std::vector<BondChange> changes;
@@ -321,7 +324,7 @@ std::vector<std::int32_t> Fracture::lower_with_fragments(std::vector<BondChange>
   return all;
 }
 
-void Fracture::lower(const std::vector<BondChange>& changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update) {
+void Fracture::lower(const std::vector<BondChange>& changes, const Configuration& at, FieldView force, bool account, const Body& body, BondUpdate& update) {
   if (!on_any_rank(!changes.empty())) return;
   const bool evaluates = force.data || account;
   std::vector<BondChange> before;

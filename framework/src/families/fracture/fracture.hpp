@@ -27,27 +27,27 @@ class Fracture {
   struct Body {
     /// force += factor times the forces of the evaluation points of the marked groups and of some others, the same ones whatever the
     /// bonds are; without data nothing is added. Their energy, over all ranks; not a number, and nothing is added, where a point is inadmissible.
-    std::function<double(ConstFieldView u, const GroupMarks&, double factor, FieldView force)> forces;
+    std::function<double(const Configuration& at, const GroupMarks&, double factor, FieldView force)> forces;
     /// The energy alone, as `forces` has it.
-    std::function<double(ConstFieldView u, const GroupMarks&)> energy;
+    std::function<double(const Configuration& at, const GroupMarks&)> energy;
     /// Evaluation points depend on the bonds of the points that they belong to, and on no others: marks are those of the groups of
     /// points whose bonds change; else of everything in their families, too.
     bool owners_alone = false;
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
   };
-  /// Bonds of fragments fail too, but for those that must not. All ranks must call it.
-  BondUpdate update(ConstFieldView u, double time_step, const StepInside& step, const Body& body);
+  /// At the end of the step of `at`, which is none in quasi-static runs. Bonds of fragments fail too, but for those that must not. All ranks must call it.
+  BondUpdate update(const Configuration& at, const StepInside& step, const Body& body);
 
   // Of the bonds that weakened in the last update outside of a step, and have something left; on one rank.
   /// Whether some of them may be forecast.
   bool settling() const noexcept { return !settling_.empty(); }
   /// Whether others forecast how far they will weaken, by `weaken`; else updates do (AitkenAcceleration).
   void let_others_forecast(bool to_others) noexcept { forecasts_ = !to_others; }
-  /// force += df/db (db/du . w) at u, the displacement of that update [N]. False where a point is inadmissible.
-  bool add_weakening(ConstFieldView u, ConstFieldView w, FieldView force, const Body& body);
-  /// Those that may be forecast, as their falls form a series that ends (AitkenAcceleration), weaken to what they are at `forecast`, and not by more than half. Energies are those at u.
-  BondUpdate weaken(ConstFieldView u, ConstFieldView forecast, const Body& body);
+  /// force += df/db (db/du . w), at the displacement of that update [N]. False where a point is inadmissible.
+  bool add_weakening(const Configuration& at, ConstFieldView w, FieldView force, const Body& body);
+  /// Those that may be forecast, as their falls form a series that ends (AitkenAcceleration), weaken to what they are at `forecast`, and not by more than half. Energies are those of `at`.
+  BondUpdate weaken(const Configuration& at, ConstFieldView forecast, const Body& body);
 
   /// Back to these bonds, which Families::changed has named at another time. All ranks must call it.
   void restore(std::span<const BondChange> changes, const std::function<void(std::span<const std::int32_t>)>& changed);
@@ -66,25 +66,25 @@ class Fracture {
   };
   /// Bonds of one excess, which fail together or stay together. All ranks have as many of them, the largest excess first.
   using Ties = std::vector<std::vector<BondChange>>;
-  /// before: at the beginning of an explicit step, u at its end; without data bonds fail at u.
-  std::vector<Found> found(std::span<const BondChange> changes, ConstFieldView before, ConstFieldView u);
+  /// before: at the beginning of the explicit step that ends here; without data bonds fail here.
+  std::vector<Found> found(std::span<const BondChange> changes, ConstFieldView before, const Configuration& at);
   /// All ranks must call it.
   Ties ties(std::span<const Found> found) const;
   GroupMarks dependent_on(std::span<const std::int32_t> ends, const Body& body) const;
   /// Lowers bonds, and those of fragments with them. at: where they fail; force += their forces there, where it has data. With the second law, those
   /// without which the energy does not rise: what was found is tried together, then in halves, those that exceed their limits most first, down to
   /// ties, which stay.
-  void fail(std::span<const Found> found, ConstFieldView at, FieldView force, const Body& body, BondUpdate& update);
-  void try_to_fail(std::span<const std::vector<BondChange>> ties, ConstFieldView at, const Body& body, std::vector<BondChange>& lawful,
+  void fail(std::span<const Found> found, const Configuration& at, FieldView force, const Body& body, BondUpdate& update);
+  void try_to_fail(std::span<const std::vector<BondChange>> ties, const Configuration& at, const Body& body, std::vector<BondChange>& lawful,
                    std::vector<BondChange>& before, BondUpdate& update);
   /// account: what the energy at `at` falls by is dissipated.
-  void lower(const std::vector<BondChange>& changes, ConstFieldView at, FieldView force, bool account, const Body& body, BondUpdate& update);
+  void lower(const std::vector<BondChange>& changes, const Configuration& at, FieldView force, bool account, const Body& body, BondUpdate& update);
   /// In the families alone; returns the ends. before: what the bonds had, in the order in which they fell. All ranks must call it.
   std::vector<std::int32_t> lower_with_fragments(std::vector<BondChange> changes, std::vector<BondChange>& before);
   void take_back(std::vector<BondChange>& before, const Body& body);
   void finish(BondUpdate& update);
-  /// What the criterion leaves of these bonds at u, whatever they had before.
-  std::vector<double> integrities(std::span<const BondId> bonds, ConstFieldView u);
+  /// What the criterion leaves of these bonds here, whatever they had before.
+  std::vector<double> integrities(std::span<const BondId> bonds, const Configuration& at);
 
   Families& families_;
   const BodyDamage& damage_;

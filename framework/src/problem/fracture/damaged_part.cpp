@@ -16,10 +16,10 @@ class BodyProblem::Damaged final : public DamagedPart {
 
   ConstFieldView inside() const override { return inside_; }
 
-  EvaluationStatus tangent_action(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
-    if (whole_) return problem_.tangent_action(u, w, Kw);
+  EvaluationStatus tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) override {
+    if (whole_) return problem_.tangent_action(at, w, Kw);
     EvaluationStatus status =
-        problem_.terms().tangent_of(rings_, problem_.seen(u, problem_.seen_), problem_.seen(w, problem_.seen_direction_), Kw);
+        problem_.terms().tangent(at.moved_to(problem_.seen(at.u(), problem_.seen_)), problem_.seen(w, problem_.seen_direction_), Kw, &rings_);
     problem_.describe(status);
     problem_.finish(Kw, status);
     return status;

@@ -10,14 +10,14 @@
 
 namespace perikit {
 
-BondUpdate FractureRecord::update(Terms& terms, ConstFieldView u, State& state, double time_step, const StepInside& step) {
-  BondUpdate update = terms.update_bonds(u, time_step, step);
+BondUpdate FractureRecord::update(Terms& terms, const Configuration& at, State& state, const StepInside& step) {
+  BondUpdate update = terms.update_bonds(at, step);
   account(update, state);
   return update;
 }
 
-bool FractureRecord::weaken(Terms& terms, ConstFieldView u, ConstFieldView forecast, State& state) {
-  const BondUpdate update = terms.weaken_bonds(u, forecast);
+bool FractureRecord::weaken(Terms& terms, const Configuration& at, ConstFieldView forecast, State& state) {
+  const BondUpdate update = terms.weaken_bonds(at, forecast);
   account(update, state);
   return update.changed > 0;
 }

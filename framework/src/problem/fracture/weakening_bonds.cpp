@@ -14,19 +14,19 @@ class BodyProblem::Weakening final : public WeakeningBonds {
 
   bool any() const override { return problem_.terms().settling(); }
 
-  EvaluationStatus add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) override {
+  EvaluationStatus add_tangent(const Configuration& at, ConstFieldView w, FieldView Kw) override {
     fill(0.0, change_);
     EvaluationStatus status =
-        problem_.terms().weakening_forces(problem_.seen(u, problem_.seen_), problem_.seen(w, direction_), change_);
+        problem_.terms().weakening_forces(at.moved_to(problem_.seen(at.u(), problem_.seen_)), problem_.seen(w, direction_), change_);
     problem_.describe(status);
     problem_.finish(change_, status);
     if (status.ok()) combine(1, Kw, -1, change_, Kw);
     return status;
   }
 
-  bool weaken(ConstFieldView u, ConstFieldView du) override {
-    combine(1, u, 1, du, change_);
-    const bool weakened = problem_.parts_.fracture.weaken(problem_.terms(), problem_.seen(u, problem_.seen_),
+  bool weaken(const Configuration& at, ConstFieldView du) override {
+    combine(1, at.u(), 1, du, change_);
+    const bool weakened = problem_.parts_.fracture.weaken(problem_.terms(), at.moved_to(problem_.seen(at.u(), problem_.seen_)),
                                                           problem_.seen(change_, direction_), problem_.state());
     if (weakened) problem_.find_pieces(true);   // fragments may have come off
     return weakened;

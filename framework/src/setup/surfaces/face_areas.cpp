@@ -79,7 +79,7 @@ Field face_areas(TermParts parts, int axis, UnitStress unit) {
   strain_along(axis);
   if (unit == UnitStress::all_around)
     for (int c = 0; c < body.dimension(); ++c) strain_along(c);
-  if (terms.tangent(rest, stretch, areas).ok()) std::copy_n(areas.component(axis), body.stride(), area.data());
+  if (terms.tangent({rest, 0}, stretch, areas).ok()) std::copy_n(areas.component(axis), body.stride(), area.data());
   return area;
 }
 

@@ -280,7 +280,7 @@ void CloudPairs<D>::run_block(std::size_t b, const PairPass& pass) {
     if (pass.only && !marked(pass.only, p)) continue;
     double energy = 0;
     if (!run_point<work>(p, pass, energy)) return report_bad(static_cast<std::int64_t>(p));
-    if (pass.energies) pass.energies[p / padding] += energy;
+    if (pass.energies) pass.energies[p / padding].stored += energy;
   }
 }
 

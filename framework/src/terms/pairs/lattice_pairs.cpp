@@ -80,7 +80,7 @@ class LatticePairs final : public PairLoop {
       double energy = 0;
       const int lane = at_once(pass) ? run_chunk<work, true>(chunk, pass, energy) : run_chunk<work, false>(chunk, pass, energy);
       if (lane >= 0) return report_bad(chunk.first + lane);
-      if (pass.energies) pass.energies[chunk.first / chunk_points] += energy;
+      if (pass.energies) pass.energies[chunk.first / chunk_points].stored += energy;
     }
   }
 

@@ -146,7 +146,8 @@ void PairAssembly<D>::fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K
 }
 
 template <int D>
-std::int64_t PairAssembly<D>::add(ConstFieldView u, BlockMatrix& K) {
+std::int64_t PairAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
+  const ConstFieldView u = at.u();
   const std::size_t rows = rows_.size();
   memory_.prepare([] { return std::make_unique<Memory>(); });
   if (formulation_.dilatation) {

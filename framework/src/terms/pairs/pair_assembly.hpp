@@ -20,7 +20,7 @@ class PairAssembly final : public Assembly {
  public:
   PairAssembly(const Formulation& formulation, const PairPoints& points, const BlockRows& rows);
 
-  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
+  std::int64_t add(const Configuration& at, BlockMatrix& K) override;
   void bonds_changed() override {}
   std::size_t bytes() const noexcept override;
 

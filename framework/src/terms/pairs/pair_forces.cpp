@@ -132,37 +132,6 @@ const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
 }
 
 template <int D>
-std::int64_t PairForces<D>::forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
-                                      std::vector<double>* energies) {
-  if (energies) energies->assign(body_.stride() / padding, 0.0);
-  if (formulation_.dilatation) {
-    // At the rim of `near` dilatations are not complete, and not the same on several ranks.
-    const std::int64_t bad = dilatation(u, {}, energies ? energies->data() : nullptr, nullptr, near.data(), only.data());
-    if (bad >= 0) return bad;
-  }
-  return loop_->run({PairWork::force, u, {}, q_, {}, force, energies ? energies->data() : nullptr, only.data(), true});
-}
-
-template <int D>
-std::int64_t PairForces<D>::add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force,
-                                          ExactSum* energy) {
-  std::vector<double> energies;
-  const std::int64_t bad = forces_of(u, only, near, force, energy ? &energies : nullptr);
-  if (energy) add_owned(body_, energies, *energy);
-  return bad;
-}
-
-template <int D>
-std::int64_t PairForces<D>::renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force,
-                                         ExactSum& energy) {
-  std::vector<double> renewed;
-  const std::int64_t bad = forces_of(u, only, near, force, &renewed);
-  replace(complete, renewed, energies_);
-  add_owned(body_, energies_, energy);
-  return bad;
-}
-
-template <int D>
 void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const {
   FamilyArrays& family = bonds.family;
   families_.load(p, BondsOf::intact, family);
@@ -209,11 +178,12 @@ void PairForces<D>::add_virial(ConstFieldView u, FieldView P) const {
 
 /// b V_i V_j w, and what the bond adds to V_i phi and V_j phi: these are shared as bonds make up theta, phi_i/theta_i d theta_i.
 template <int D>
-void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) {
+void PairForces<D>::add_bonds(const Configuration& at, const Region& region, BondSamples& samples) {
+  const ConstFieldView u = at.u();
   const bool dilates = formulation_.dilatation != nullptr;
   if (dilates) {
     if (density_.size() == 0) density_ = body_.make_field(1);
-    dilatation(u, {}, nullptr, density_.data(), near.data());
+    dilatation(at, {}, {.evaluated = region.gradients}, nullptr, density_.data());
   }
   const auto by_theta = [&](std::size_t p) {
     const double theta = scale_.data()[p] * theta_.data()[p];
@@ -221,7 +191,7 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
   };
   samples.take_both_ways();
   parallel_for(body_.stride() / padding, [&](std::size_t g) {
-    if (!marks[g] || !samples.keeps_group(g)) return;
+    if (!(*region.evaluated)[g] || !samples.keeps_group(g)) return;
     Bonds bonds;
     for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
       if (!body_.alive(p) || !samples.wants(p)) continue;
@@ -240,18 +210,19 @@ void PairForces<D>::add_bonds(ConstFieldView u, const GroupMarks& marks, const G
 }
 
 template <int D>
-std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, double* energies, double* density,
-                                       const std::uint8_t* only, const std::uint8_t* local, Arrival* arrival, PointMotion* motion) {
-  PairPass pass{PairWork::dilatation, u, {}, {}, {}, theta_, nullptr, only, local != nullptr};
-  pass.arrival = arrival;
-  pass.motion = motion;
+std::int64_t PairForces<D>::dilatation(const Configuration& at, ConstFieldView w, const Region& region, GroupEnergy* energies, double* density) {
+  // At the rim of `gradients` dilatations are not complete, and not the same on several ranks.
+  const std::uint8_t *const only = region.near() ? region.near() : region.only(), *const local = region.near() ? region.only() : nullptr;
+  PairPass pass{PairWork::dilatation, at.unfinished(), {}, {}, {}, theta_, nullptr, only, local != nullptr};
+  pass.arrival = at.arrival();
+  pass.motion = at.motion();
   const std::int64_t bad = loop_->run(pass);
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
   if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
   if (rates) {
     if (rate_.size() == 0) rate_ = body_.make_field(1);
-    loop_->run({PairWork::dilatation_rate, u, w, {}, {}, rate_, nullptr, only, local != nullptr});
+    loop_->run({PairWork::dilatation_rate, at.u(), w, {}, {}, rate_, nullptr, only, local != nullptr});
   }
   // Points in batches; padding has d/m = 0.
   const std::size_t stride = body_.stride(), batches = (stride + batch_points - 1) / batch_points;
@@ -270,37 +241,34 @@ std::int64_t PairForces<D>::dilatation(ConstFieldView u, ConstFieldView w, doubl
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
       if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
-      if (energies && body_.alive(p) && (!local || marked(local, p))) energies[p / padding] += body_.volume(p) * phi[l];
+      if (energies && body_.alive(p) && (!local || marked(local, p))) energies[p / padding].stored += body_.volume(p) * phi[l];
     }
   });
   return -1;
 }
 
 template <int D>
-std::int64_t PairForces<D>::forces(ConstFieldView u, FieldView force, ExactSum* energy, Arrival* arrival, PointMotion* motion) {
-  if (energy) energies_.assign(body_.stride() / padding, 0.0);
+std::int64_t PairForces<D>::forces(const Configuration& at, const Region& region, const ForceSum& sum) {
+  GroupEnergy* const energies = sum.wants_stored() ? sum.energies.data() : nullptr;
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, energy ? energies_.data() : nullptr, nullptr, nullptr, nullptr, arrival, motion);
+    const std::int64_t bad = dilatation(at, {}, region, energies, nullptr);
     if (bad >= 0) return bad;
   }
-  PairPass pass{PairWork::force, u, {}, q_, {}, force, energy ? energies_.data() : nullptr};
-  pass.arrival = arrival;
-  if (!formulation_.dilatation) pass.motion = motion;   // else all have moved
-  pass.screen = screen_;
-  if (screen_ && formulation_.dilatation) pass.by_theta = by_theta_.data();
-  const std::int64_t bad = loop_->run(pass);
-  if (energy) add_owned(body_, energies_, *energy);
-  return bad;
+  PairPass pass{PairWork::force, at.unfinished(), {}, q_, {}, sum.force, energies, region.only(), !region.whole()};
+  pass.arrival = at.arrival();
+  if (!formulation_.dilatation) pass.motion = at.motion();   // else all have moved
+  pass.screen = region.whole() ? screen_ : nullptr;
+  if (pass.screen && formulation_.dilatation) pass.by_theta = by_theta_.data();
+  return loop_->run(pass);
 }
 
 template <int D>
-std::int64_t PairForces<D>::tangent_of(ConstFieldView u, ConstFieldView w, FieldView Kw, const std::uint8_t* only,
-                                       const std::uint8_t* near) {
+std::int64_t PairForces<D>::tangent(const Configuration& at, ConstFieldView w, const Region& region, FieldView Kw) {
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, w, nullptr, nullptr, near, only);
+    const std::int64_t bad = dilatation(at, w, region, nullptr, nullptr);
     if (bad >= 0) return bad;
   }
-  return loop_->run({PairWork::tangent, u, w, q_, rate_, Kw, nullptr, only, only != nullptr});
+  return loop_->run({PairWork::tangent, at.u(), w, q_, rate_, Kw, nullptr, region.only(), !region.whole()});
 }
 
 template <int D>
@@ -309,17 +277,17 @@ std::unique_ptr<Assembly> PairForces<D>::make_assembly(const BlockRows& rows) co
 }
 
 template <int D>
-std::int64_t PairForces<D>::add_samples(ConstFieldView u, PointSamples& samples) {
+std::int64_t PairForces<D>::sample(const Configuration& at, PointSamples& samples) {
   Field volumetric = body_.make_field(1), bonds = body_.make_field(1);
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(u, {}, nullptr, volumetric.data());
+    const std::int64_t bad = dilatation(at, {}, {}, nullptr, volumetric.data());
     if (bad >= 0) return bad;
   }
   if (any_of(samples.asked, Sampling::virial)) {
     samples.P = body_.make_field(D * D);
-    add_virial(u, samples.P);
+    add_virial(at.u(), samples.P);
   }
-  const std::int64_t bad = loop_->run({PairWork::energy, u, {}, q_, {}, bonds, nullptr});
+  const std::int64_t bad = loop_->run({PairWork::energy, at.u(), {}, q_, {}, bonds, nullptr});
   for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
   return bad;
 }
@@ -328,6 +296,7 @@ template <int D>
 void PairForces<D>::report(ModelReport& report) const {
   report.evaluation_points += share_ ? families_.bonds() / 2 : families_.bonds();
   report.bytes += loop_->bytes();
+  report.resting += loop_->resting_counts();
   for (const Field* field :
        {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_, &by_theta_})
     report.bytes += field->bytes();

@@ -14,6 +14,7 @@
 #include "families/stretch.hpp"
 #include "model/formulation.hpp"
 #include "operators/bond_screen.hpp"
+#include "operators/group_energy.hpp"
 #include "perikit/core/point_motion.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/operators/laws.hpp"
@@ -29,7 +30,7 @@ struct PairPass {
   ConstFieldView u, w;
   ConstFieldView q, dq;           ///< phi' d/m and its rate by point; empty without dilatation
   FieldView out;
-  double* energies = nullptr;          ///< += by group of eight points
+  GroupEnergy* energies = nullptr;     ///< += by group of eight points
   /// By group of eight points: others are left alone (dilatation); where `local`, the bonds alone that these own, each
   /// once: as in a whole loop on points whose families lie in `only`, anything elsewhere (dilatation and force).
   const std::uint8_t* only = nullptr;

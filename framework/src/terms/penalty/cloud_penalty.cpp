@@ -33,9 +33,9 @@ class CloudPenalty final : public ZeroEnergyPenalty {
   }
 
   /// Points beyond `only` have no flux: what was left of them depends on what was evaluated before.
-  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only, const std::uint8_t* near) override {
+  void apply(ConstFieldView u, double factor, FieldView force, const Region& region, Wanted wanted) override {
+    const std::uint8_t *const only = region.only(), *const near = region.near();
     mirror(u);
-    if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return blocks_.moves(u, b); });
     const auto wants = [](const std::uint8_t* marks, std::size_t p) { return !marks || marked(marks, p); };

@@ -40,8 +40,8 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   }
 
   /// Points of `near` in rows without sources feel those of `only` as well: sources send M_i u_i, and -M_i u_k stands in B_k u_k.
-  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only, const std::uint8_t* near) override {
-    if (wanted.energies) wanted.energies->assign(families_.body().stride() / padding, 0.0);
+  void apply(ConstFieldView u, double factor, FieldView force, const Region& region, Wanted wanted) override {
+    const std::uint8_t *const only = region.only(), *const near = region.near();
     if (only) quiet_.wake();
     else quiet_.look(2, [&](std::size_t b) { return families_.tiles.moves(b, u); });
     parallel_for(families_.tiles.blocks.size(), [&](std::size_t b) {

@@ -29,7 +29,7 @@ void PenaltyAssembly<D>::add_row(std::size_t row, BlockMatrix& K, Memory& m) con
 }
 
 template <int D>
-std::int64_t PenaltyAssembly<D>::add(ConstFieldView, BlockMatrix& K) {
+std::int64_t PenaltyAssembly<D>::add(const Configuration&, BlockMatrix& K) {
   memory_.prepare([] { return std::make_unique<Memory>(); });
   colouring_.for_each([&](std::size_t b) {
     for (std::size_t r = blocks_.begin(b); r < blocks_.end(b); ++r) add_row(r, K, memory_.mine());

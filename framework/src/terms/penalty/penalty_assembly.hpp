@@ -11,7 +11,7 @@ class PenaltyAssembly final : public Assembly {
  public:
   PenaltyAssembly(const PenaltyParts& parts, const BlockRows& rows);
 
-  std::int64_t add(ConstFieldView u, BlockMatrix& K) override;
+  std::int64_t add(const Configuration& at, BlockMatrix& K) override;
   void bonds_changed() override {}
   std::size_t bytes() const noexcept override { return 0; }
 

@@ -34,11 +34,11 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
   }
 
-  void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only, const std::uint8_t*) override {
+  void apply(ConstFieldView u, double factor, FieldView force, const Region& region, Wanted wanted) override {
+    const std::uint8_t* const only = region.only();
     read(u);
     force_.assign(rows_.size(), Row{});
     energy_.assign(wanted.any() ? rows_.size() : 0, 0.0);
-    if (wanted.energies) wanted.energies->assign(rows_.body().stride() / padding, 0.0);
     if (only) quiet_.wake();
     else quiet_.look(1, [&](std::size_t b) {
       bool any = false;

@@ -5,40 +5,23 @@
 
 namespace perikit {
 
-std::int64_t ZeroEnergyPenalty::add_forces(ConstFieldView u, FieldView force, ExactSum* energy) {
-  apply(u, 1.0, force, {energy ? &energies_ : nullptr, screen_});
-  if (energy) add_owned(parts_.families.body(), energies_, *energy);
-  return -1;
-}
-
-
-std::int64_t ZeroEnergyPenalty::add_tangent(ConstFieldView, ConstFieldView w, FieldView Kw) {
-  apply(w, -1.0, Kw, {});
-  return -1;
-}
-
 void ZeroEnergyPenalty::take(std::size_t p, double energy, const Wanted& wanted) const {
-  if (wanted.energies) (*wanted.energies)[p / padding] += energy;
+  if (wanted.energies) wanted.energies[p / padding].stored += energy;
   if (!wanted.screen) return;
   const Families& families = parts_.families;
   const double left = families.body().volume(p) * (1 - families.damage(p));
   if (energy > left * wanted.screen->density[p]) wanted.screen->mark(p);
 }
 
-std::int64_t ZeroEnergyPenalty::add_samples(ConstFieldView u, PointSamples& samples) {
-  add_density(u, samples.strain_energy_density.data());
-  return -1;
-}
-
 /// The penalty of a point belongs to its bonds as the rest of its energy does. It is no stress.
-void ZeroEnergyPenalty::add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks&, BondSamples& samples) {
+void ZeroEnergyPenalty::add_bonds(const Configuration& at, const Region& region, BondSamples& samples) {
   if (samples.what() == BondSampling::derivative) return;  // terms/bond_release.hpp knows what it does
   const Body& body = parts_.families.body();
   Field density = body.make_field(1);
-  add_density(u, density.data(), marks.data());
+  add_density(at.u(), density.data(), region.only());
   for (const std::int32_t p : body.internal()) {
-    const auto at = static_cast<std::size_t>(p);
-    if (marked(marks, at)) samples.add({p, -1, 0.0, density.data()[at] * body.volume(at)});
+    const auto i = static_cast<std::size_t>(p);
+    if (marked(*region.evaluated, i)) samples.add({p, -1, 0.0, density.data()[i] * body.volume(i)});
   }
 }
 

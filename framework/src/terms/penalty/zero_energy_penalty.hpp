@@ -12,50 +12,44 @@
 
 namespace perikit {
 
-class ZeroEnergyPenalty : public Term {
+class ZeroEnergyPenalty : public Term, public AssembledTerm, public SampledTerm, public BreakableTerm {
  public:
-  std::int64_t add_forces(ConstFieldView u, FieldView force, ExactSum* energy) final;
-  std::int64_t add_tangent(ConstFieldView u, ConstFieldView w, FieldView Kw) final;
-  std::int64_t add_samples(ConstFieldView u, PointSamples& samples) final;
-  std::int64_t add_forces_of(ConstFieldView u, const GroupMarks& only, const GroupMarks& near, FieldView force, ExactSum* energy) final {
-    std::vector<double> energies;
-    apply(u, 1.0, force, {energy ? &energies : nullptr}, only.data(), near.data());
-    if (energy) add_owned(parts_.families.body(), energies, *energy);
+  std::int64_t forces(const Configuration& at, const Region& region, const ForceSum& sum) final {
+    apply(at.u(), 1.0, sum.force, region, {sum.wants_stored() ? sum.energies.data() : nullptr, region.whole() ? screen_ : nullptr});
     return -1;
   }
-  std::int64_t renew_forces(ConstFieldView u, const GroupMarks& only, const GroupMarks& complete, const GroupMarks& near, FieldView force, ExactSum& energy) final {
-    std::vector<double> renewed;
-    apply(u, 1.0, force, {&renewed}, only.data(), near.data());
-    replace(complete, renewed, energies_);
-    add_owned(parts_.families.body(), energies_, energy);
+  std::int64_t tangent(const Configuration&, ConstFieldView w, const Region& region, FieldView Kw) final {
+    apply(w, -1.0, Kw, region, {});
     return -1;
-  }
-  std::int64_t add_tangent_of(ConstFieldView, ConstFieldView w, const GroupMarks& only, const GroupMarks& near, FieldView Kw) final {
-    apply(w, -1.0, Kw, {}, only.data(), near.data());
-    return -1;
-  }
-  void add_bonds(ConstFieldView u, const GroupMarks& marks, const GroupMarks& near, BondSamples& samples) final;
-  int coupling_reach() const noexcept final { return 2; }
-  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const final;
-  const NearestFailure* watch(const BodyDamage&) final { return nullptr; }
-  bool screen(BondScreen* screen) final {
-    screen_ = screen;
-    return true;
   }
   void report(ModelReport& report) const final;
-  RestingCounts resting_counts() const noexcept final { return {}; }  // counted with the gradients
+  AssembledTerm* assembled() noexcept final { return this; }
+  SampledTerm* sampled() noexcept final { return this; }
+  BreakableTerm* breakable() noexcept final { return this; }
+
+  int coupling_reach() const noexcept final { return 2; }
+  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const final;
+  std::int64_t sample(const Configuration& at, PointSamples& samples) final {
+    add_density(at.u(), samples.strain_energy_density.data());
+    return -1;
+  }
+  std::int64_t forces_and_samples(const Configuration& at, const ForceSum& sum, PointSamples& samples) final {
+    forces(at, {}, sum);
+    return sample(at, samples);
+  }
+  void add_bonds(const Configuration& at, const Region& region, BondSamples& samples) final;
+  void screen(BondScreen* screen) final { screen_ = screen; }
 
  protected:
   explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
   /// What is wanted beside forces.
   struct Wanted {
-    std::vector<double>* energies = nullptr;   ///< E by group of eight points [J]
+    GroupEnergy* energies = nullptr;   ///< += E by group of eight points [J]
     BondScreen* screen = nullptr;              ///< groups with a point that holds too much are marked
     bool any() const noexcept { return energies || screen; }
   };
-  /// force += -factor dE/du [N]. only, near: what add_forces_of says; null: all.
-  virtual void apply(ConstFieldView u, double factor, FieldView force, Wanted wanted, const std::uint8_t* only = nullptr,
-                     const std::uint8_t* near = nullptr) = 0;
+  /// force += -factor dE/du [N].
+  virtual void apply(ConstFieldView u, double factor, FieldView force, const Region& region, Wanted wanted) = 0;
   /// Takes the energy of point p.
   void take(std::size_t p, double energy, const Wanted& wanted) const;
   /// density[p] += energy of point p per volume [J/m^3]. only: by group of eight points, where it is needed; null: everywhere.
@@ -65,7 +59,6 @@ class ZeroEnergyPenalty : public Term {
   PenaltyParts parts_;
 
  private:
-  std::vector<double> energies_;  ///< of the last forces with an energy
   BondScreen* screen_ = nullptr;
 };
 
