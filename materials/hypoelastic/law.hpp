@@ -17,9 +17,12 @@ namespace perikit {
 ///   psi1 = psi0 + (J0 s0 + J1 s1)/2 : strain, the work of the stress
 /// History: U - I, s (components i <= j), psi.
 struct Hypoelastic {
-  static constexpr MaterialTraits traits{.constants = 2, .hyperelastic = false};
+  static constexpr MaterialTraits traits{.constants = 2, .hyperelastic = false, .symmetric_tangent = false};
   template <class S>
-  static constexpr int state_components = 2 * symmetric_size<S> + 1;
+  static constexpr std::array state{StateVariable{"stretch", "-", symmetric_size<S>}, StateVariable{"unrotated_stress", "Pa", symmetric_size<S>},
+                                    StateVariable{"work", "J/m^3", 1}};
+  template <class S>
+  static constexpr int size = components_of(state<S>);
 
   void constants(const MaterialInput& input, double* k) const {
     const Moduli moduli = elastic_constants(input);
@@ -31,20 +34,20 @@ struct Hypoelastic {
   /// The step that begins at one state.
   template <class T, class S>
   struct Step {
-    using State = std::array<T, state_components<S>>;
+    using State = std::array<T, size<S>>;
 
-    explicit Step(const State& state) noexcept
-        : stretch(unpack_symmetric<S>(state.data())),
-          stress(unpack_symmetric<S>(state.data() + symmetric_size<S>)),
-          energy(state.back()) {}
+    explicit Step(const State& begin) noexcept
+        : stretch(unpack_symmetric<S>(begin.data())),
+          stress(unpack_symmetric<S>(begin.data() + symmetric_size<S>)),
+          energy(begin.back()) {}
 
     template <class K>
-    HistoryUpdate<T, S, state_components<S>> update(const Tensor<T, S>& H, const K& k) const noexcept {
+    HistoryUpdate<T, S, size<S>> update(const Tensor<T, S>& H, const K& k) const noexcept {
       const Stretch end(H);
       const Tensor<T, S> strain = symmetric_part(increment(end) * middle_inverse(end)), s = stress + hooke(strain, k);
       const T J = 1.0 + jacobian_minus_one(H), J0 = 1.0 + jacobian_minus_one(stretch);
       const Tensor<T, S> second = J * rotate(end.inverse, s);  // second Piola-Kirchhoff stress J U^-1 s U^-1
-      HistoryUpdate<T, S, state_components<S>> r;
+      HistoryUpdate<T, S, size<S>> r;
       r.psi = energy + 0.5 * inner(J0 * stress + J * s, strain);
       r.P = second + H * second;
       pack_symmetric(end.U, r.state.data());
@@ -149,8 +152,8 @@ struct Hypoelastic {
   };
 
   template <class S, class T>
-  Step<T, S> after(const std::array<T, state_components<S>>& state) const noexcept {
-    return Step<T, S>(state);
+  Step<T, S> after(const std::array<T, size<S>>& begin) const noexcept {
+    return Step<T, S>(begin);
   }
 };
 

@@ -22,6 +22,6 @@ PERIKIT_PLUGIN(registrar) {
        .equations = "sigma = R s R^T,  ds/dt = lambda tr(d) I + 2 mu d,  d = R^T sym(dF/dt F^-1) R = sym(dU/dt U^-1),  F = R U\n"
                     "P = J sigma F^-T",
        .source = "Partmann et al., eqs. 4.45-4.57, after Flanagan and Taylor",
-       .limits = "Explicit runs only: the stress depends on the path. `evaluate` takes the displacement as one increment."},
+       .limits = "The stress depends on the path: results depend on the steps, to second order. `evaluate` takes the displacement as one increment."},
       [](const ParameterValues&, const PartFactory&) { return std::make_unique<LawMaterial<Hypoelastic>>(); });
 }

@@ -217,4 +217,16 @@ double largest(const Body& body, ConstFieldView a) {
   return most;
 }
 
+Field product(const BodyProblem& problem, const BlockMatrix& K, ConstFieldView w) {
+  Field out = problem.body().make_field(K.dimension);
+  const auto d = static_cast<std::size_t>(K.dimension);
+  for (std::size_t r = 0; r < K.rows(); ++r)
+    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+      for (std::size_t a = 0; a < d; ++a)
+        for (std::size_t c = 0; c < d; ++c)
+          out.component(static_cast<int>(a))[K.point[r]] +=
+              K.values[(b * d + a) * d + c] * w.component(static_cast<int>(c))[K.point[static_cast<std::size_t>(K.column[b])]];
+  return out;
+}
+
 }  // namespace perikit::contract

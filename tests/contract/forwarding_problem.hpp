@@ -27,7 +27,9 @@ class ForwardingProblem : public Problem {
   void assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) override { of_.assemble_companion(u, K, most_bulk); }
   std::unique_ptr<VolumetricPart> volumetric_part() override { return of_.volumetric_part(); }
   bool constant_stiffness() const noexcept override { return of_.constant_stiffness(); }
-  bool advance(double time_step, FieldView velocity) override { return of_.advance(time_step, velocity); }
+  void accept() override { of_.accept(); }
+  void revert() override { of_.revert(); }
+  bool update_bonds(const Configuration& at, double elapsed, FieldView velocity) override { return of_.update_bonds(at, elapsed, velocity); }
   std::unique_ptr<WeakeningBonds> weakening_bonds() override { return of_.weakening_bonds(); }
   std::unique_ptr<DamagedPart> damaged_part() override { return of_.damaged_part(); }
   StretchRange stretches(ConstFieldView u) override { return of_.stretches(u); }

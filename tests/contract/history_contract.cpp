@@ -1,5 +1,5 @@
 /// Laws with history under every kinematics that has gradients, on lattices and clouds: each evaluation point keeps its own
-/// history, steps advance it, nothing else does.
+/// history, accepted steps advance it, nothing else does.
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -52,7 +52,7 @@ void for_every_model(const std::function<void(BodyProblem&)>& check) {
 }
 
 std::vector<double> kept(const BodyProblem& problem) {
-  const std::span<const double> values = std::as_const(*problem.terms().history()).values();
+  const std::span<const double> values = std::as_const(*problem.terms().material_points()).values();
   return {values.begin(), values.end()};
 }
 
@@ -180,6 +180,13 @@ TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's fo
         worst = std::max(worst, std::abs(slope + Kw.component(k)[p]));
       }
     CHECK_MESSAGE(worst <= 1e-7 * largest(problem.body(), Kw), "tangent off by ", worst, " of ", largest(problem.body(), Kw));
+    BlockMatrix K;
+    REQUIRE(problem.assemble_tangent({u, 0, step}, K).ok());
+    CHECK_FALSE(K.symmetric);
+    const Field assembled = product(problem, K, w);
+    double apart = 0;
+    for (std::size_t k = 0; k < Kw.size(); ++k) apart = std::max(apart, std::abs(assembled.data()[k] - Kw.data()[k]));
+    CHECK_MESSAGE(apart <= 1e-11 * largest(problem.body(), Kw), "the assembled tangent is off by ", apart, " of ", largest(problem.body(), Kw));
   });
 }
 
@@ -203,15 +210,28 @@ TEST_CASE("kinematics: rate laws are the same for any number of threads, and res
   set_thread_count(threads);
 }
 
-TEST_CASE("kinematics: rate laws are refused where iterations are no steps of a path") {
-  const std::vector<Example> all = examples(Kind::kinematics);
-  if (all.empty()) return;  // a stabilization is tested
-  const Scene scene = parse_scene(rate_scene(all.front(), 2, false, false), "contract.toml", subject().registry);
-  WorkSteps steps;
-  CHECK_THROWS_WITH_AS(build_problem(scene, subject().registry, {.quasi_static = true}, steps),
-                       doctest::Contains("material.type: found \"hypoelastic\", a law whose stress depends on the path"),
-                       InputError);
-  CHECK_NOTHROW(build_problem(scene, subject().registry, {}, steps));
+TEST_CASE("kinematics: a step of rate laws that is given up changes nothing, and one that is accepted counts once") {
+  for_every_model([](BodyProblem& problem) {
+    walk(problem);
+    const std::vector<std::byte> start = problem.snapshot();
+    const std::vector<double> before = kept(problem);
+    const Field u = deformed(problem, 38, 0.01), elsewhere = deformed(problem, 39, 0.02);
+    respond(problem, u, step);
+    problem.accept();
+    const std::vector<double> after = kept(problem);
+    CHECK(after != before);
+    problem.accept();
+    CHECK_MESSAGE(kept(problem) == after, "a step was accepted twice");
+    problem.restore(start);
+    respond(problem, elsewhere, step);
+    problem.revert();
+    problem.accept();
+    CHECK_MESSAGE(kept(problem) == before, "a step that was given up was accepted");
+    respond(problem, elsewhere, step);   // an iteration on the way
+    respond(problem, u, step);
+    problem.accept();
+    CHECK_MESSAGE(kept(problem) == after, "iterations leave something behind");
+  });
 }
 
 TEST_CASE("kinematics: rate laws evaluate symmetric bonds once: the same forces and work as from both ends") {

@@ -154,3 +154,33 @@ TEST_CASE("integrator: the quasi-static answer depends neither on the steps nor 
     }
   }
 }
+
+TEST_CASE("integrator: quasi-static paths of a law that remembers, in closed form") {
+  // A uniform strain in ten steps: s grows by the strain of each, 2 (U1 - U0)/(U0 + U1), and the work by (J0 s0 + J1 s1)/2 of it.
+  constexpr int steps = 10, cells = 30;
+  constexpr double stretch = 0.3;
+  for (const Example& integrator : quasi_static_integrators(steps)) {
+    INFO(integrator.part, ": ", integrator.table);
+    BodyOptions body{.dimension = 1, .material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3"};
+    body.cells = cells;
+    body.sets = "ends = \"x < 8 || x > 22\"\n";
+    body.conditions = fmt::format("[[boundary]]\nset = \"ends\"\ndisplacement = [\"{}*t*x\"]\n", stretch);
+    const auto simulation = build_run(body, integrator);
+    Watch watch(*simulation);
+    simulation->run(watch);
+    BodyProblem& problem = simulation->problem();
+    REQUIRE(problem.laws().space() == Space::line_strain);
+    const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(problem.body().owned().front()));
+    double s = 0, psi = 0, volume = 0;
+    for (int n = 1; n <= steps; ++n) {
+      const double before = 1 + stretch * (n - 1) / steps, after = 1 + stretch * n / steps, strain = 2 * (after - before) / (before + after);
+      const double s_before = s;
+      s += (moduli.lambda + 2 * moduli.mu) * strain;
+      psi += 0.5 * (before * s_before + after * s) * strain;
+    }
+    for (const std::int32_t p : problem.body().internal()) volume += problem.body().volume(static_cast<std::size_t>(p));
+    CHECK(problem.state().energies.strain == doctest::Approx(psi * volume).epsilon(1e-8));
+    for (const std::int32_t p : problem.body().internal())
+      CHECK(std::abs(problem.state().displacement().component(0)[p] - stretch * problem.body().position(static_cast<std::size_t>(p))[0]) < 1e-7);
+  }
+}

@@ -10,11 +10,11 @@ namespace perikit::contract {
 class WitnessProblem final : public ForwardingProblem {
  public:
   using ForwardingProblem::ForwardingProblem;
-  std::function<void()> before, after;  ///< of advance
+  std::function<void()> before, after;  ///< of update_bonds
 
-  bool advance(double time_step, FieldView velocity) override {
+  bool update_bonds(const Configuration& at, double elapsed, FieldView velocity) override {
     if (before) before();
-    const bool changed = of_.advance(time_step, velocity);
+    const bool changed = of_.update_bonds(at, elapsed, velocity);
     if (after) after();
     return changed;
   }

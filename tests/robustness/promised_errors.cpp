@@ -28,8 +28,6 @@ TEST_CASE("errors: combinations of parts that have no meaning are refused with w
           {"material.type: found \"hypoelastic\", a law whose stress depends on the path, with force_state = \"local\"", "allowed: a material without history"});
   refused("--set 'kinematics={type=\"baqp\",stabilization=\"silling\"}'",
           {"kinematics.stabilization: found 'silling' over baqp; allowed: over kinematics with one gradient per point"});
-  refused("--set 'material={type=\"hypoelastic\",density=1,youngs_modulus=1,poisson_ratio=0.3}' --set 'integrator={type=\"newton\"}'",
-          {"material.type: found \"hypoelastic\", a law whose stress depends on the path, with integrator \"newton\"", "allowed: an explicit integrator"});
   refused("--set kinematics.type=ordinary --set 'material={type=\"neo_hookean\",density=1,shear_modulus=1}'", {"material: found shear_modulus only; allowed: exactly 2 of youngs_modulus, poisson_ratio"});
 }
 

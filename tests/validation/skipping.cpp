@@ -29,7 +29,7 @@ class CountedMaterial final : public Material {
   MaterialTraits traits() const noexcept override { return law_->traits(); }
   void constants(const MaterialInput& input, double* out) const override { law_->constants(input, out); }
   Moduli small_strain(const double* k) const noexcept override { return law_->small_strain(k); }
-  int state_components(Space space) const noexcept override { return law_->state_components(space); }
+  std::span<const StateVariable> state(Space space) const noexcept override { return law_->state(space); }
   Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
     if (batch.psi) work_.energies += batch.n;
     if (batch.P) work_.stresses += batch.n;

@@ -1,16 +1,27 @@
 #pragma once
 /// Assembled tangents: K = sum_q W_q g_q . A(F_q) . g_q with the evaluation points and stencils of the spaces, never by probing.
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <vector>
 
 #include "assembly/block_rows.hpp"
+#include "operators/material_points.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/model/configuration.hpp"
 
 namespace perikit {
+
+/// What the laws of a space remember, for assemblies.
+struct RememberedPoints {
+  const MaterialPoints& points;
+  /// Where something is remembered: the numbers of the evaluation points, row by row those of a point (Formulation::parts of them) or of its bonds;
+  /// -1: there is none. To be asked again after bonds have changed.
+  std::function<std::vector<std::int64_t>(const BlockRows& rows)> numbers;
+  std::vector<std::int64_t> numbers_of(const BlockRows& rows) const { return points.remember() ? numbers(rows) : std::vector<std::int64_t>(); }
+};
 
 /// What one term adds to a tangent.
 class Assembly {

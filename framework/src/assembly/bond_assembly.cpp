@@ -22,8 +22,9 @@ void over_rows(std::size_t rows, Body&& body) {
 }  // namespace
 
 template <int D>
-BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
+BondAssembly<D>::BondAssembly(const SpaceParts& parts, RememberedPoints remembered, const BlockRows& rows)
     : rows_(rows),
+      remembered_(std::move(remembered)),
       laws_(parts.laws),
       formulation_(parts.formulation),
       factors_(parts.factors),
@@ -38,6 +39,7 @@ BondAssembly<D>::BondAssembly(const SpaceParts& parts, const BlockRows& rows)
 
 template <int D>
 void BondAssembly<D>::read_bonds() {
+  numbers_ = remembered_.numbers_of(rows_);
   const std::size_t rows = rows_.size();
   bond_.resize(rows_.bonds());
   own_gradient_.assign(D * rows, 0.0);
@@ -152,7 +154,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
   const std::size_t p = rows_.point(i), q = rows_.point(j);
   const double weight = bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0);
-  const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, volume_share_[i]);
+  const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, volume_share_[i], numbers_.empty() ? -1 : numbers_[k]);
   if (interfaces_ && laminate_of_[k] >= 0) m.batch.add_laminate(laminate_[static_cast<std::size_t>(laminate_of_[k])]);
   m.bond_of_lane.push_back(k);
   m.row_of_lane.push_back(i);
@@ -222,33 +224,37 @@ void BondAssembly<D>::couple(std::size_t i, std::size_t k, int lane, const Tange
   if (!formulation_.selective()) return;
   // Selective map: mixed terms of y with Hbar_i, and Hbar_i with itself.
   const double* mixed = batch.mixed(lane);
+  const double* back = batch.back(lane);
   const double* bar = batch.bar(lane);
   for (std::size_t s = 0; s < slots; ++s)
     for (std::size_t f = 0; f < D; ++f)
       for (std::size_t a = 0; a < D; ++a)
         for (std::size_t b = 0; b < D; ++b) {
-          double M = 0;
-          for (std::size_t e = 0; e < D; ++e) M += R[e][s] * mixed[(a * D + e) * entries + b * D + f];
+          double M = 0, M_back = 0;
+          for (std::size_t e = 0; e < D; ++e) {
+            M += R[e][s] * mixed[(a * D + e) * entries + b * D + f];
+            M_back += R[e][s] * back[(b * D + f) * entries + a * D + e];
+          }
           const std::size_t at = (s * slots + f) * entries + a * D + b, transposed = (f * slots + s) * entries + b * D + a;
           ii[at] += near_share[s] * M;
-          ii[transposed] += near_share[s] * M;
+          ii[transposed] += near_share[s] * M_back;
           ji[at] += far_share[s] * M;
-          ij[transposed] += far_share[s] * M;
+          ij[transposed] += far_share[s] * M_back;
           if (s < D) ii[at] += bar[(a * D + s) * entries + b * D + f];
         }
 }
 
 template <int D>
-std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, ConstFieldView u, bool convex, Memory& m) {
+std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, const Configuration& at, bool convex, Memory& m) {
   m.batch.clear();
   m.bond_of_lane.clear();
   m.row_of_lane.clear();
   const auto finish = [&]() -> std::int64_t {
-    const int bad = m.batch.evaluate(convex);
+    const int bad = m.batch.evaluate(at.time_step(), convex);
     if (bad >= 0) return m.batch.owner(bad);
     for (int lane = 0; lane < m.batch.lanes(); ++lane) {
-      const auto at = static_cast<std::size_t>(lane);
-      couple(m.row_of_lane[at], m.bond_of_lane[at], lane, m.batch);
+      const auto l = static_cast<std::size_t>(lane);
+      couple(m.row_of_lane[l], m.bond_of_lane[l], lane, m.batch);
     }
     m.batch.clear();
     m.bond_of_lane.clear();
@@ -259,7 +265,7 @@ std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, Con
     for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) {
       const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
       if ((j < i && evaluated_once(i, j)) || bond_[k].weight == 0) continue;
-      add_lane(i, k, u, m);
+      add_lane(i, k, at.u(), m);
       if (m.batch.lanes() < batch_points) continue;
       const std::int64_t bad = finish();
       if (bad >= 0) return bad;
@@ -313,7 +319,8 @@ template <int D>
 std::int64_t BondAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
   const ConstFieldView u = at.u();
   const std::size_t rows = rows_.size();
-  memory_.prepare([&] { return std::make_unique<Memory>(laws_, formulation_.selective()); });
+  if (!laws_.symmetric_tangent()) K.symmetric = false;
+  memory_.prepare([&] { return std::make_unique<Memory>(remembered_.points, formulation_.selective()); });
   Hbar_.resize(entries * rows);
   diagonal_.resize(coupling * rows);
   off_diagonal_.resize(coupling * rows_.bonds());
@@ -325,7 +332,7 @@ std::int64_t BondAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
   });
   FirstBad bad;
   colouring_.for_each([&](std::size_t b) {
-    const std::int64_t point = add_bonds(blocks_.begin(b), blocks_.end(b), u, K.convex, memory_.mine());
+    const std::int64_t point = add_bonds(blocks_.begin(b), blocks_.end(b), at, K.convex, memory_.mine());
     if (point >= 0) bad.report(point);
   });
   if (bad.point() >= 0) return bad.point();

@@ -15,7 +15,7 @@ namespace perikit {
 template <int D>
 class BondAssembly final : public Assembly {
  public:
-  BondAssembly(const SpaceParts& parts, const BlockRows& rows);
+  BondAssembly(const SpaceParts& parts, RememberedPoints remembered, const BlockRows& rows);
 
   std::int64_t add(const Configuration& at, BlockMatrix& K) override;
   void bonds_changed() override { read_bonds(); }
@@ -28,7 +28,7 @@ class BondAssembly final : public Assembly {
   static constexpr std::size_t strip = slots * entries;
 
   struct Memory {
-    explicit Memory(const Laws& laws, bool selective) : batch(laws, selective) {}
+    Memory(const MaterialPoints& points, bool selective) : batch(points, selective) {}
     TangentBatch<D> batch;
     std::vector<std::size_t> bond_of_lane, row_of_lane;
     Reach reach;
@@ -49,7 +49,7 @@ class BondAssembly final : public Assembly {
   void point_gradients(std::size_t row, ConstFieldView u) noexcept;
   /// ij and ji have the same gradient and the same law: one evaluation with both weights.
   bool evaluated_once(std::size_t i, std::size_t j) const noexcept;
-  std::int64_t add_bonds(std::size_t first, std::size_t last, ConstFieldView u, bool convex, Memory& m);
+  std::int64_t add_bonds(std::size_t first, std::size_t last, const Configuration& at, bool convex, Memory& m);
   void add_lane(std::size_t i, std::size_t k, ConstFieldView u, Memory& m);
   void couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept;
   void condense(std::size_t row, BlockMatrix& K, Memory& m) const;
@@ -60,6 +60,8 @@ class BondAssembly final : public Assembly {
   void gradient_of(std::size_t i, std::size_t k, const Value& value, double* g) const noexcept;
 
   const BlockRows& rows_;
+  RememberedPoints remembered_;
+  std::vector<std::int64_t> numbers_;   ///< see RememberedPoints
   const Laws& laws_;
   const Formulation& formulation_;
   std::span<const double> factors_;  ///< of the weights; empty: 1

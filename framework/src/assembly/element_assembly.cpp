@@ -9,9 +9,10 @@
 namespace perikit {
 
 template <int D>
-ElementAssembly<D>::ElementAssembly(const SpaceParts& parts, const BlockRows& rows)
+ElementAssembly<D>::ElementAssembly(const SpaceParts& parts, RememberedPoints remembered, const BlockRows& rows)
     : rows_(rows),
-      laws_(parts.laws),
+      remembered_(std::move(remembered)),
+      numbers_(remembered_.numbers_of(rows)),
       interfaces_(parts.interfaces),
       shape_{parts.formulation, parts.formulation.parts(D), parts.factors, parts.shift},
       blocks_(rows.size(), rows.body().block_points()),
@@ -45,8 +46,10 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
   for (int c = 0; c < D && owners > 0; ++c)
     for (int e = 0; e < D; ++e) Hbar[c * D + e] = gradient(0, c, e);
   for (int q = 0; q < element.points; ++q) {
-    const int lane =
-        m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().remaining_influence(p));
+    const std::size_t which = static_cast<std::size_t>(element.which[static_cast<std::size_t>(q)]),
+                      at = (shape_.parts > 0 ? row * static_cast<std::size_t>(shape_.parts) : rows_.first(row)) + which;
+    const int lane = m.batch.add(static_cast<std::int32_t>(p), element.weight[static_cast<std::size_t>(q)], rows_.families().remaining_influence(p),
+                                 numbers_.empty() ? -1 : numbers_[at]);
     const auto of_value = [&](const auto& value, double* to) {
       const double own = value(p);
       for (std::size_t k = 0; k < m.nodes.size(); ++k) {
@@ -64,7 +67,7 @@ void ElementAssembly<D>::add_lanes(std::size_t row, const PointElement<D>& eleme
 }
 
 template <int D>
-std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, ConstFieldView u, BlockMatrix& K,
+std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, const Configuration& at, BlockMatrix& K,
                                            Memory& m) const {
   m.batch.clear();
   m.of_row.clear();
@@ -73,16 +76,17 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
     PointElement<D>& own = m.elements[r - first];
     if (!rows_.whole(r)) build_element<D>(rows_, shape_, r, own, m.scratch);
     m.of_row.push_back(rows_.whole(r) ? &*whole_ : &own);
-    add_lanes(r, *m.of_row.back(), u, m);
+    add_lanes(r, *m.of_row.back(), at.u(), m);
   }
-  const int bad = m.batch.evaluate(K.convex);
+  const int bad = m.batch.evaluate(at.time_step(), K.convex);
   if (bad >= 0) return m.batch.owner(bad);
   int lane = 0;
   for (std::size_t r = first; r < last; ++r) {
     const PointElement<D>& element = *m.of_row[r - first];
     element_nodes(rows_, r, m.nodes);
-    stiffness<D>(element, m.batch, lane, shape_.formulation.selective(), m.scratch);
-    scatter_element<D>(m.nodes, m.scratch.K.data(), element.width, element.test.empty(), K);
+    const bool symmetric = element.test.empty() && remembered_.points.laws().symmetric_tangent();
+    stiffness<D>(element, m.batch, lane, shape_.formulation.selective(), symmetric, m.scratch);
+    scatter_element<D>(m.nodes, m.scratch.K.data(), element.width, symmetric, K);
     lane += element.points;
   }
   return -1;
@@ -90,9 +94,8 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
 
 template <int D>
 std::int64_t ElementAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
-  const ConstFieldView u = at.u();
-  if (shape_.formulation.force_state == ForceState::local) K.symmetric = false;
-  memory_.prepare([&] { return std::make_unique<Memory>(laws_, shape_.formulation.selective()); });
+  if (shape_.formulation.force_state == ForceState::local || !remembered_.points.laws().symmetric_tangent()) K.symmetric = false;
+  memory_.prepare([&] { return std::make_unique<Memory>(remembered_.points, shape_.formulation.selective()); });
   // Enough points at once to fill batches of the materials.
   const std::size_t bonds = rows_.bonds() / rows_.size() + 1;
   const std::size_t at_once =
@@ -101,7 +104,7 @@ std::int64_t ElementAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
   colouring_.for_each([&](std::size_t b) {
     const std::size_t end = blocks_.end(b);
     for (std::size_t r = blocks_.begin(b); r < end; r += at_once) {
-      const std::int64_t point = fill_rows(r, std::min(end, r + at_once), u, K, memory_.mine());
+      const std::int64_t point = fill_rows(r, std::min(end, r + at_once), at, K, memory_.mine());
       if (point >= 0) return bad.report(point);
     }
   });

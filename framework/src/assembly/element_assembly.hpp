@@ -14,16 +14,17 @@ namespace perikit {
 template <int D>
 class ElementAssembly final : public Assembly {
  public:
-  ElementAssembly(const SpaceParts& parts, const BlockRows& rows);
+  ElementAssembly(const SpaceParts& parts, RememberedPoints remembered, const BlockRows& rows);
 
   std::int64_t add(const Configuration& at, BlockMatrix& K) override;
-  void bonds_changed() override {}   // elements of points that are not whole are made anew each time
-  std::size_t bytes() const noexcept override { return 0; }
+  /// Elements of points that are not whole are made anew each time.
+  void bonds_changed() override { numbers_ = remembered_.numbers_of(rows_); }
+  std::size_t bytes() const noexcept override { return numbers_.size() * sizeof(std::int64_t); }
 
  private:
   /// Memory of one thread.
   struct Memory {
-    explicit Memory(const Laws& laws, bool selective) : batch(laws, selective) {}
+    Memory(const MaterialPoints& points, bool selective) : batch(points, selective) {}
     TangentBatch<D> batch;
     ElementScratch<D> scratch;
     std::vector<PointElement<D>> elements;          ///< of points that are not whole
@@ -33,11 +34,12 @@ class ElementAssembly final : public Assembly {
   };
 
   /// Rows [first, last) at once. Returns the field index of an inadmissible point or -1.
-  std::int64_t fill_rows(std::size_t first, std::size_t last, ConstFieldView u, BlockMatrix& K, Memory& m) const;
+  std::int64_t fill_rows(std::size_t first, std::size_t last, const Configuration& at, BlockMatrix& K, Memory& m) const;
   void add_lanes(std::size_t row, const PointElement<D>& element, ConstFieldView u, Memory& m) const;
 
   const BlockRows& rows_;
-  const Laws& laws_;
+  RememberedPoints remembered_;
+  std::vector<std::int64_t> numbers_;   ///< see RememberedPoints
   std::shared_ptr<const Interfaces> interfaces_;
   ElementShape shape_;
   std::optional<PointElement<D>> whole_;  ///< of rows with the whole family

@@ -55,6 +55,7 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
   out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) - neighbours.begin());
   out.width = padded(static_cast<std::size_t>(out.nodes));
   out.weight.clear();
+  out.which.clear();
   out.test.clear();
   out.points = 0;
   if (neighbours.empty()) {  // nothing to stretch
@@ -72,6 +73,7 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
     write_point<D>(out, 0, [&](int k, int e) { return s.gradient[static_cast<std::size_t>(k * D + e)]; });
     out.points = 1;
     out.weight.push_back(intact);
+    out.which.push_back(0);
     return;
   }
   bond_shares(rows.families(), p, formulation.weight, s.family, s.share);
@@ -95,6 +97,7 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
     if (q < owners) continue;
     const double factor = shape.factors.empty() ? 1.0 : shape.factors[rows.first(row) + static_cast<std::size_t>(q - owners)];
     out.weight.push_back(share * (shape.parts > 0 ? intact : rows.volume(row)) * factor);
+    out.which.push_back(q - owners);
     ++out.points;
   }
 }
@@ -102,7 +105,7 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
 // K_kl = sum over rows r, s of g_rk M_rs g_sl. Eight columns l at a time: T_r = sum_s M_rs g_sl, then products with g_rk, all for
 // each pair (a, b) of displacement components.
 template <int D>
-void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective,
+void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective, bool symmetric,
                ElementScratch<D>& s) {
   constexpr int n = D * D, packs = static_cast<int>(tile) / pack_width;
   const std::size_t width = element.width, owners = selective ? 1 : 0,
@@ -130,11 +133,12 @@ void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int
               for (int f = 0; f < D; ++f) sum += Pack(own[(a * D + e) * n + b * D + f]) * g[f];
               if (selective) {
                 const double* mixed = batch.mixed(first_lane + q);
+                const double* back = batch.back(first_lane + q);
                 const double* owner = batch.bar(first_lane + q);
                 for (int f = 0; f < D; ++f) {
                   sum += Pack(mixed[(a * D + e) * n + b * D + f]) * g_bar[f];
                   bar[a][e][b] +=
-                      Pack(mixed[(b * D + f) * n + a * D + e]) * g[f] + Pack(owner[(a * D + e) * n + b * D + f]) * g_bar[f];
+                      Pack(back[(a * D + e) * n + b * D + f]) * g[f] + Pack(owner[(a * D + e) * n + b * D + f]) * g_bar[f];
                 }
               }
               sum.store(T(a, b, static_cast<std::size_t>(point * D + e)) + lane_in_tile);
@@ -146,7 +150,7 @@ void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int
     }
     for (int ab = 0; ab < n; ++ab) {
       const double* right = s.T.data() + static_cast<std::size_t>(ab) * rows * tile;
-      for (std::size_t k = 0; k < (element.test.empty() ? column + tile : width); k += 4) {
+      for (std::size_t k = 0; k < (symmetric ? column + tile : width); k += 4) {
         Pack sums[4][packs];
         for (std::size_t r = 0; r < rows; ++r) {
           const double* left = (element.test.empty() ? element.g : element.test).data() + r * width + k;
@@ -170,8 +174,8 @@ template void scatter_element<2>(const std::vector<std::int32_t>&, const double*
 template void build_element<2>(const BlockRows&, const ElementShape&, std::size_t, PointElement<2>&, ElementScratch<2>&);
 template void scatter_element<3>(const std::vector<std::int32_t>&, const double*, std::size_t, bool, BlockMatrix&);
 template void build_element<3>(const BlockRows&, const ElementShape&, std::size_t, PointElement<3>&, ElementScratch<3>&);
-template void stiffness<1>(const PointElement<1>&, const TangentBatch<1>&, int, bool, ElementScratch<1>&);
-template void stiffness<2>(const PointElement<2>&, const TangentBatch<2>&, int, bool, ElementScratch<2>&);
-template void stiffness<3>(const PointElement<3>&, const TangentBatch<3>&, int, bool, ElementScratch<3>&);
+template void stiffness<1>(const PointElement<1>&, const TangentBatch<1>&, int, bool, bool, ElementScratch<1>&);
+template void stiffness<2>(const PointElement<2>&, const TangentBatch<2>&, int, bool, bool, ElementScratch<2>&);
+template void stiffness<3>(const PointElement<3>&, const TangentBatch<3>&, int, bool, bool, ElementScratch<3>&);
 
 }  // namespace perikit

@@ -35,6 +35,7 @@ struct PointElement {
   AlignedVector<double> g;     ///< [q][e][node], the owner's own gradient first (with the selective map), then points
   AlignedVector<double> test;  ///< likewise what stresses are tested with, where that is another thing (local force states); else empty
   std::vector<double> weight;  ///< W_q [m^3]
+  std::vector<int> which;      ///< of the parts or bonds of the owner
   const double* row(int q, int e) const noexcept { return g.data() + static_cast<std::size_t>(q * D + e) * width; }
 };
 
@@ -53,9 +54,9 @@ template <int D>
 void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out,
                    ElementScratch<D>& s);
 
-/// s.K <- sum_q W_q g_q . A_q . g_q with the tangents of lanes first_lane ... of the batch.
+/// s.K <- sum_q W_q g_q . A_q . g_q with the tangents of lanes first_lane ... of the batch. symmetric: only tiles of 8 x 8 on and above the diagonal.
 template <int D>
-void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective,
+void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int first_lane, bool selective, bool symmetric,
                ElementScratch<D>& s);
 
 }  // namespace perikit

@@ -9,9 +9,10 @@
 namespace perikit {
 
 template <int D>
-TangentBatch<D>::TangentBatch(const Laws& laws, bool selective) : laws_(laws), selective_(selective) {
-  laws.prepare(scratch_, true);
-  A_.assign(static_cast<std::size_t>(laws.components() * laws.components()) * batch_points, 0.0);
+TangentBatch<D>::TangentBatch(const MaterialPoints& points, bool selective) : points_(points), laws_(points.laws()), selective_(selective) {
+  laws_.prepare(scratch_, true);
+  A_.assign(static_cast<std::size_t>(laws_.components() * laws_.components()) * batch_points, 0.0);
+  state_.assign(points.components() * batch_points, 0.0);
   if (!selective) return;
   P_.assign(9 * batch_points, 0.0);
   mapped_.assign(9 * batch_points, 0.0);
@@ -22,29 +23,32 @@ TangentBatch<D>::TangentBatch(const Laws& laws, bool selective) : laws_(laws), s
 }
 
 template <int D>
-int TangentBatch<D>::add(std::int32_t owner, double weight, double share) {
+int TangentBatch<D>::add(std::int32_t owner, double weight, double share, std::int64_t number) {
   const int lane = lanes_++;
   if (static_cast<std::size_t>(lane) == owner_.size()) {
     const std::size_t size = owner_.size() + batch_points;
     owner_.resize(size);
     weight_.resize(size);
     share_.resize(size);
+    if (points_.remember()) number_.resize(size);
     H_.resize(size * stored, 0.0);
     own_.resize(size * entries);
     if (selective_) {
       Hbar_.resize(size * stored, 0.0);
       mixed_.resize(size * entries);
+      back_.resize(size * entries);
       bar_.resize(size * entries);
     }
   }
   owner_[static_cast<std::size_t>(lane)] = owner;
   weight_[static_cast<std::size_t>(lane)] = weight;
   share_[static_cast<std::size_t>(lane)] = share;
+  if (points_.remember()) number_[static_cast<std::size_t>(lane)] = number;
   return lane;
 }
 
 template <int D>
-int TangentBatch<D>::evaluate(bool convex) {
+int TangentBatch<D>::evaluate(double time_step, bool convex) {
   for (int first = 0; first < lanes_; first += batch_points) {
     const int n = std::min(batch_points, lanes_ - first), last = first + static_cast<int>(padded(static_cast<std::size_t>(n)));
     for (int lane = first + n; lane < last; ++lane) {  // padding at rest
@@ -54,7 +58,7 @@ int TangentBatch<D>::evaluate(bool convex) {
         if (selective_) owner_H(lane, c) = 0;
       }
     }
-    const int bad = selective_ ? evaluate_selective(first, n) : evaluate_plain(first, n);
+    const int bad = selective_ ? evaluate_selective(first, n, time_step) : evaluate_plain(first, n, time_step);
     if (bad >= 0) return first + bad;
   }
   for (int lane = 0; convex && lane < lanes_; ++lane) remove_negative_curvature(lane);
@@ -80,15 +84,26 @@ void TangentBatch<D>::remove_negative_curvature(int lane) {
   make_semidefinite(A, n);
   for (int k = 0; k < n * n; ++k)
     if (k / n < components || k % n >= components) place(k / n, k % n) = A[k];
+  for (int r = 0; r < components; ++r)
+    for (int c = 0; c < components; ++c) back_[at + c * components + r] = mixed_[at + r * components + c];
 }
 
 template <int D>
-int TangentBatch<D>::evaluate_plain(int first, int n) {
+LawBatch TangentBatch<D>::batch_of(int first, int n, double time_step) {
   LawBatch batch;
   batch.n = n;
-  batch.H = &H(first, 0);
   batch.points = owner_.data() + first;
   batch.A = A_.data();
+  if (!points_.remember()) return batch;
+  points_.gather({number_.data() + first, static_cast<std::size_t>(n)}, state_.data());
+  batch.state = {state_.data(), nullptr, batch_points, time_step};
+  return batch;
+}
+
+template <int D>
+int TangentBatch<D>::evaluate_plain(int first, int n, double time_step) {
+  LawBatch batch = batch_of(first, n, time_step);
+  batch.H = &H(first, 0);
   const Status status = laws_.evaluate(batch, scratch_);
   if (!status.ok()) return status.inadmissible;
   if (const int bad = evaluate_laminates(first, n, &H(first, 0)); bad >= 0) return bad;
@@ -127,18 +142,15 @@ int TangentBatch<D>::evaluate_laminates(int first, int n, const double* H) {
 }
 
 template <int D>
-int TangentBatch<D>::evaluate_selective(int first, int n) {
+int TangentBatch<D>::evaluate_selective(int first, int n, double time_step) {
   const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   owner_volume(laws_.space(), {lanes, batch_points, &owner_H(first, 0), nullptr}, volume_.data(), batch_points);
   std::copy_n(share_.data() + first, lanes, volume_.data() + volume_share * batch_points);
   const OwnerVolumes owners{volume_.data(), batch_points, volume_group_.data(), false};
   selective_map(laws_.space(), {lanes, 1, &H(first, 0), nullptr, owners, inverse_.data(), growth_.data()}, mapped_.data(), nullptr);
-  LawBatch batch;
-  batch.n = n;
+  LawBatch batch = batch_of(first, n, time_step);
   batch.H = mapped_.data();
-  batch.points = owner_.data() + first;
   batch.P = P_.data();
-  batch.A = A_.data();
   const Status status = laws_.evaluate(batch, scratch_);
   if (!status.ok()) return status.inadmissible;
   if (const int bad = evaluate_laminates(first, n, mapped_.data()); bad >= 0) return bad;
@@ -146,7 +158,7 @@ int TangentBatch<D>::evaluate_selective(int first, int n) {
     const auto at = static_cast<std::size_t>(first + l), lane = at * entries;
     const SelectiveLane in{&H(first, 0) + l, &owner_H(first, 0) + l, P_.data() + l, A_.data() + l, growth_[static_cast<std::size_t>(l)],
                            share_[at], weight_[at]};
-    selective_tangent<D>(in, own_.data() + lane, mixed_.data() + lane, bar_.data() + lane);
+    selective_tangent<D>(in, own_.data() + lane, mixed_.data() + lane, back_.data() + lane, bar_.data() + lane);
   }
   return -1;
 }

@@ -5,37 +5,41 @@
 #include <vector>
 
 #include "operators/laminate.hpp"
+#include "operators/material_points.hpp"
 #include "perikit/operators/laws.hpp"
 
 namespace perikit {
 
-/// Matrices over in-space components, row-major: entry (aD + e, bD + f) couples P_ae with F_bf. With the selective map the energy
-/// depends on Ft, the point's own gradient, and on Fbar, the owner's.
+/// Matrices over in-space components, row-major: entry (aD + e, bD + f) couples P_ae with F_bf. With the selective map stresses act on
+/// and depend on Ft, the point's own gradient, and Fbar, the owner's.
 template <int D>
 class TangentBatch {
  public:
   static constexpr int components = D * D, entries = components * components;
 
-  TangentBatch(const Laws& laws, bool selective);
+  TangentBatch(const MaterialPoints& points, bool selective);
   void clear() noexcept {
     lanes_ = 0;
     laminates_.clear();
   }
   int lanes() const noexcept { return lanes_; }
   /// A lane for an evaluation point of W = weight [m^3]; its gradients are to be filled in. share: c of the selective map.
-  int add(std::int32_t owner, double weight, double share);
+  /// number: of the evaluation point, whose state it has at the beginning of the step; -1: nothing has happened to it.
+  int add(std::int32_t owner, double weight, double share, std::int64_t number = -1);
   /// The last lane is a laminate.
   void add_laminate(const LaminatePoint& point) { laminates_.push_back({lanes_ - 1, point}); }
   /// Component aD + e of Ht, and of the owner's Hbar (selective map only).
   double& H(int lane, int component) noexcept { return at(H_, lane, component); }
   double& owner_H(int lane, int component) noexcept { return at(Hbar_, lane, component); }
-  /// Returns the first inadmissible lane or -1. convex: the matrices of each lane together lose their negative eigenvalues.
-  int evaluate(bool convex = false);
+  /// Returns the first inadmissible lane or -1. time_step: of the step that ends at the gradients [s]. convex: the matrices of each lane together lose
+  /// their negative eigenvalues.
+  int evaluate(double time_step, bool convex = false);
   int owner(int lane) const noexcept { return owner_[static_cast<std::size_t>(lane)]; }
-  /// W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar.
+  /// W dP/dFt, W dP/dFbar, W dPbar/dFt, W dPbar/dFbar: see selective_tangent.
   double* own(int lane) noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }
   const double* own(int lane) const noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }
   const double* mixed(int lane) const noexcept { return mixed_.data() + static_cast<std::size_t>(lane) * entries; }
+  const double* back(int lane) const noexcept { return back_.data() + static_cast<std::size_t>(lane) * entries; }
   const double* bar(int lane) const noexcept { return bar_.data() + static_cast<std::size_t>(lane) * entries; }
 
  private:
@@ -43,18 +47,23 @@ class TangentBatch {
   double& at(AlignedVector<double>& x, int lane, int component) noexcept {
     return x[static_cast<std::size_t>((lane / batch_points * stored + component) * batch_points + lane % batch_points)];
   }
-  int evaluate_plain(int first, int n);
-  int evaluate_selective(int first, int n);
+  int evaluate_plain(int first, int n, double time_step);
+  int evaluate_selective(int first, int n, double time_step);
+  /// Of the laws of these lanes, without what goes in and comes out.
+  LawBatch batch_of(int first, int n, double time_step);
   int evaluate_laminates(int first, int n, const double* H);
   void remove_negative_curvature(int lane);
 
+  const MaterialPoints& points_;
   const Laws& laws_;
   bool selective_;
   int lanes_ = 0;
   AlignedVector<double> H_, Hbar_;   ///< batches of [component][batch_points]
   std::vector<std::int32_t> owner_;  ///< padded to batches
   std::vector<double> weight_, share_;   ///< by lane
-  AlignedVector<double> own_, mixed_, bar_;
+  std::vector<std::int64_t> number_;     ///< likewise, where something is remembered
+  AlignedVector<double> state_;          ///< of a batch
+  AlignedVector<double> own_, mixed_, back_, bar_;
   AlignedVector<double> A_, P_, mapped_, growth_, inverse_, volume_;
   std::vector<std::int64_t> volume_group_;
   LawScratch scratch_;

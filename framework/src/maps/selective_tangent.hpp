@@ -1,5 +1,5 @@
 #pragma once
-/// Second derivatives of psi(a Ft), a = 1 + c ((Jbar/Jt)^(1/3) - 1), with respect to Ft and Fbar, in closed form.
+/// Derivatives of the stresses that the law at Fh = a Ft, a = 1 + c ((Jbar/Jt)^(1/3) - 1), has on Ft and Fbar, in closed form.
 
 namespace perikit {
 
@@ -14,8 +14,9 @@ struct SelectiveLane {
   double weight;  ///< W: factor of the results
 };
 
-/// own, mixed, bar <- W d2psi/dFt dFt, W d2psi/dFt dFbar, W d2psi/dFbar dFbar over in-space components, D^2 x D^2 row-major.
+/// own, mixed, back, bar <- W times the derivatives of the stress on Ft by Ft and by Fbar, and of that on Fbar by Ft and by Fbar, over in-space components,
+/// D^2 x D^2 row-major. Where A is symmetric, `back` is the transpose of `mixed`.
 template <int D>
-void selective_tangent(const SelectiveLane& lane, double* own, double* mixed, double* bar) noexcept;
+void selective_tangent(const SelectiveLane& lane, double* own, double* mixed, double* back, double* bar) noexcept;
 
 }  // namespace perikit

@@ -30,12 +30,12 @@ LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) co
   const bool keep = keeps_history(s);
   if (s.first_number >= 0 && laws_.records().size() == 1) {
     const std::int64_t first = s.first_number + numbers;
-    return {history_->begin() + first, keep ? history_->end() + first : nullptr, history_->stride(), time_step_};
+    return {points_->begin() + first, keep ? points_->end() + first : nullptr, points_->stride(), time_step_};
   }
-  for (std::size_t c = 0; c < history_->components(); ++c)
+  for (std::size_t c = 0; c < points_->components(); ++c)
     for (int l = 0; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
       const std::int64_t q = l >= n ? -1 : s.first_number >= 0 ? s.first_number + l : s.number[l];
-      s.old_state[c * batch_points + static_cast<std::size_t>(l)] = q < 0 ? 0.0 : history_->begin()[c * history_->stride() + static_cast<std::size_t>(q + numbers)];
+      s.old_state[c * batch_points + static_cast<std::size_t>(l)] = q < 0 ? 0.0 : points_->begin()[c * points_->stride() + static_cast<std::size_t>(q + numbers)];
     }
   if (keep) std::fill(s.new_state.begin(), s.new_state.end(), 0.0);   // laws without a history leave theirs alone
   return {s.old_state.data(), keep ? s.new_state.data() : nullptr, batch_points, time_step_};
@@ -43,10 +43,10 @@ LawState BatchWork::begin_state(int n, BatchScratch& s, std::int64_t numbers) co
 
 void BatchWork::end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept {
   if (!keeps_history(s) || (s.first_number >= 0 && laws_.records().size() == 1)) return;
-  for (std::size_t c = 0; c < history_->components(); ++c)
+  for (std::size_t c = 0; c < points_->components(); ++c)
     for (int l = 0; l < n; ++l) {
       const std::int64_t q = s.first_number >= 0 ? s.first_number + l : s.number[l];
-      if (q >= 0) history_->end()[c * history_->stride() + static_cast<std::size_t>(q + numbers)] = s.new_state[c * batch_points + static_cast<std::size_t>(l)];
+      if (q >= 0) points_->end()[c * points_->stride() + static_cast<std::size_t>(q + numbers)] = s.new_state[c * batch_points + static_cast<std::size_t>(l)];
     }
 }
 
@@ -62,9 +62,9 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   batch.dP = dP;
   if (samples()) batch.lateral = s.lateral;
   if (dissipates()) batch.dissipated = s.dissipated;
-  if (history_) batch.state = begin_state(n, s, numbers);
+  if (points_) batch.state = begin_state(n, s, numbers);
   const int bad = (s.one_law >= 0 ? laws_.evaluate_law(static_cast<std::size_t>(s.one_law), batch, s.law) : laws_.evaluate(batch, s.law)).inadmissible;
-  if (history_ && bad < 0) end_state(n, s, numbers);
+  if (points_ && bad < 0) end_state(n, s, numbers);
   if (screen_)
     for (int l = 0; l < n; ++l) s.highest[l] = std::max(s.highest[l], s.psi[l]);
   return bad;

@@ -12,7 +12,7 @@
 #include "operators/bond_screen.hpp"
 #include "operators/group_energy.hpp"
 #include "operators/laminates.hpp"
-#include "operators/law_history.hpp"
+#include "operators/material_points.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/point_motion.hpp"
 #include "perikit/operators/laws.hpp"
@@ -111,8 +111,9 @@ struct BatchTask {
   Work work = Work::force;
   bool energy = false;                   ///< stored energies are wanted
   bool selective = false;                ///< gradients go through the selective map
-  LawHistory* history = nullptr;
-  double time_step = 0;                  ///< of the step that the evaluation ends [s]; 0: it ends none, and no history is kept
+  MaterialPoints* points = nullptr;      ///< of laws that remember
+  double time_step = 0;                  ///< of the step that laws take [s]
+  bool ends_step = false;                ///< what they remember at its end is kept, and what they dissipate counts
   const Balance* balance = nullptr;      ///< in place of laws
   BondScreen* screen = nullptr;          ///< where bonds that may hold too much are marked
   const Laminates* laminates = nullptr;
@@ -126,8 +127,9 @@ class BatchWork {
         work_(task.work),
         energy_(task.energy),
         selective_(task.selective),
-        history_(task.history),
+        points_(task.points && task.points->remember() ? task.points : nullptr),
         time_step_(task.time_step),
+        ends_step_(task.ends_step),
         balance_(task.balance),
         screen_(task.screen),
         laminates_(task.laminates),
@@ -149,7 +151,7 @@ class BatchWork {
   bool selective() const noexcept { return selective_; }
   bool tangent() const noexcept { return work_ == Work::tangent; }
   /// The evaluation ends a step in which laws dissipate.
-  bool dissipates() const noexcept { return work_ == Work::force && history_ && time_step_ > 0 && laws_.dissipates(); }
+  bool dissipates() const noexcept { return work_ == Work::force && points_ && ends_step_ && laws_.dissipates(); }
   /// After evaluate, where bonds are screened: marks the group of eight points from first_point on if one of them may hold too
   /// much. Lanes first_lane ... first_lane + lanes - 1 belong to these points in turn.
   void screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept;
@@ -163,7 +165,7 @@ class BatchWork {
   /// evaluation points with factors these; null: 1.
   void screen_bonds(int n, int far_end, const BatchScratch& s, const double* factor = nullptr, const double* far_factor = nullptr) const;
   /// Whether the numbers of lanes are asked for.
-  bool numbered() const noexcept { return history_ || laminates_ || finder_; }
+  bool numbered() const noexcept { return points_ || laminates_ || finder_; }
   /// Some evaluation points are laminates.
   bool laminates() const noexcept { return laminates_ != nullptr; }
   /// These eight points may own laminates.
@@ -230,14 +232,15 @@ class BatchWork {
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
   void end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
-  bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && time_step_ > 0 && s.keep_history; }
+  bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && ends_step_ && s.keep_history; }
 
   const Laws& laws_;
   Work work_;
   bool energy_;
   bool selective_, pulled_back_ = false, volume_stiffness_ = false;
-  LawHistory* history_;
+  MaterialPoints* points_;               ///< null where nothing is remembered
   double time_step_;
+  bool ends_step_;
   const Balance* balance_;
   BondScreen* screen_;
   const Laminates* laminates_;

@@ -38,6 +38,10 @@ bool Laws::objective() const noexcept {
   return std::all_of(records_.begin(), records_.end(), [](const auto& r) { return r.traits.objective; });
 }
 
+bool Laws::symmetric_tangent() const noexcept {
+  return std::all_of(records_.begin(), records_.end(), [](const auto& r) { return r.traits.symmetric_tangent; });
+}
+
 Moduli Laws::moduli(std::size_t p) const {
   const MaterialRecord& record = record_of(p);
   if (record.uniform) return record.material->small_strain(record.constants.data());

@@ -222,7 +222,7 @@ int BatchWork::mapped_pass(int n, BatchScratch& s, int ends) const noexcept {
   double* const rate = tangent || volume_stiffness_ ? s.other : nullptr;
   const bool one_law = this->one_law(s);
   if (ends == 2 && !one_law) std::copy_n(s.far, lanes, s.owner + lanes);
-  if (ends == 2 && history_) {
+  if (ends == 2 && points_) {
     for (int l = 0; l < lanes; ++l) {
       if (s.first_number >= 0) s.number[l] = s.first_number + l;
       s.number[lanes + l] = s.number[l] < 0 ? -1 : s.number[l] + s.far_number;

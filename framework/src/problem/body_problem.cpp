@@ -154,7 +154,7 @@ EvaluationStatus BodyProblem::evaluate_forces(const Configuration& at, FieldView
   if (at.motion() && (!at.motion()->inside() || asked != Sampling::nothing || ghosts_ || images())) at.motion()->finish();
   const auto seen_at = [&](ConstFieldView seen) { return Configuration(seen, at.time(), at.time_step(), at.velocity()); };
   // Where histories go on or bonds fail between forces and samples these are others.
-  if (asked != Sampling::nothing && !terms().history() && !ghosts_ && !parts_.fracture.damage()) {
+  if (asked != Sampling::nothing && !terms().material_points() && !ghosts_ && !parts_.fracture.damage()) {
     PointSamples samples{.asked = asked};
     status = terms().forces_and_samples(seen_at(seen(u, seen_)), force, energy, samples);
     if (status.ok()) kept_ = std::move(samples);
@@ -253,33 +253,35 @@ bool BodyProblem::constant_stiffness() const noexcept {
   return terms().has_gradients() && laws().constant_tangent() && !parts_.fracture.damage();
 }
 
-bool BodyProblem::advance(double time_step, FieldView velocity) {
-  if (terms().history()) terms().history()->advance();
-  if (laws().dissipates()) {
-    const double dissipated = terms().take_dissipated();
-    state().energies.dissipated += dissipated;
-    state().energies.dissipated_by_laws += dissipated;
-  }
+void BodyProblem::accept() {
+  const double dissipated = terms().accept();
+  state().energies.dissipated += dissipated;
+  state().energies.dissipated_by_laws += dissipated;
+}
+
+void BodyProblem::revert() { terms().revert(); }
+
+bool BodyProblem::update_bonds(const Configuration& at, double elapsed, FieldView velocity) {
   if (!parts_.fracture.damage()) return false;
-  const ConstFieldView u = state().displacement();
+  const ConstFieldView u = at.u();
   const Seen whole = seen(u, seen_);
   std::vector<std::int32_t> moved;
   StepInside step;
   if (velocity.data) {
     step.begin = [&](FieldView before) {
-      combine(1, u, -time_step, velocity, before);
+      combine(1, u, -elapsed, velocity, before);
       if (ghosts_) ghosts_->forward(before);
       if (images()) images()->extend(before);
     };
     step.act = [&](FieldView force, double time, double moment) {
-      const double growth = push(force, time, (1 - moment) * time_step, velocity, moved);
+      const double growth = push(force, time, (1 - moment) * elapsed, velocity, moved);
       // `whole` follows.
       if (images()) seen(u, seen_);
       else if (ghosts_) ghosts_->forward(Seen::writable(u));
       return growth;
     };
   }
-  const BondUpdate update = parts_.fracture.update(terms(), {whole, state().time, time_step, velocity}, state(), step);
+  const BondUpdate update = parts_.fracture.update(terms(), at.moved_to(whole), elapsed, state(), step);
   if (update.changed == 0) return false;
   if (velocity.data) renew_forces(moved, update.ends);
   find_pieces(true);

@@ -61,7 +61,9 @@ class BodyProblem final : public Problem {
   /// of what either does is what the other does, too.
   void sample_along(Sampling asked) noexcept { along_ = asked; }
   bool constant_stiffness() const noexcept override;
-  bool advance(double time_step, FieldView velocity = {}) override;
+  void accept() override;
+  void revert() override;
+  bool update_bonds(const Configuration& at, double elapsed, FieldView velocity = {}) override;
   std::int64_t failed_bonds() const override;
   std::unique_ptr<WeakeningBonds> weakening_bonds() override;
   std::unique_ptr<DamagedPart> damaged_part() override;

@@ -11,7 +11,7 @@ namespace {
 [[noreturn]] void refuse() { throw InputError("the saved state belongs to other materials"); }
 }  // namespace
 
-HistoryRecord::HistoryRecord(const Terms& terms) : history_(terms.history()), components_(history_ ? history_->components() : 0) {
+HistoryRecord::HistoryRecord(const Terms& terms) : history_(terms.material_points()), components_(history_ ? history_->components() : 0) {
   for (const HistoryPlace& place : terms.history_points()) {
     if (!place.own) continue;
     points_.push_back(place.point);
@@ -44,9 +44,9 @@ void HistoryRecord::write(ByteWriter& out) const {
 }
 
 void HistoryRecord::read(ByteReader& in, Terms& terms) {
-  LawHistory* const history = terms.history();
+  MaterialPoints* const of_laws = terms.material_points();
   const auto components = in.value<std::uint64_t>(), count = in.value<std::uint64_t>();
-  if (components != (history ? history->components() : 0)) refuse();
+  if (components != (of_laws ? of_laws->components() : 0)) refuse();
   in.expect(count, sizeof(HistoryPoint) + components * sizeof(double));
   const std::vector<HistoryPlace> places = terms.history_points();
   std::vector<std::uint64_t> rows;  // of these in the record; both ascend
@@ -54,8 +54,8 @@ void HistoryRecord::read(ByteReader& in, Terms& terms) {
     for (const auto point = in.value<HistoryPoint>(); rows.size() < places.size() && places[rows.size()].point == point;)
       rows.push_back(row);
   if (rows.size() < places.size()) refuse();
-  if (!history) return;
-  const std::span<double> all = history->values();
+  if (!of_laws) return;
+  const std::span<double> all = of_laws->values();
   std::ranges::fill(all, 0.0);
   std::vector<double> values(components);
   std::size_t next = 0;
@@ -63,7 +63,7 @@ void HistoryRecord::read(ByteReader& in, Terms& terms) {
     in.bytes(values.data(), components * sizeof(double));
     for (; next < rows.size() && rows[next] == row; ++next)
       for (std::size_t c = 0; c < components; ++c)
-        all[c * history->stride() + static_cast<std::size_t>(places[next].number)] = values[c];
+        all[c * of_laws->stride() + static_cast<std::size_t>(places[next].number)] = values[c];
   }
   terms.history_restored();
 }
@@ -76,16 +76,16 @@ std::size_t HistoryRecord::count(ByteReader& in) {
 }
 
 void HistoryRecord::write_here(const Terms& terms, ByteWriter& out) {
-  const LawHistory* const history = terms.history();
-  out.numbers(history ? history->values() : std::span<const double>());
+  const MaterialPoints* const of_laws = terms.material_points();
+  out.numbers(of_laws ? of_laws->values() : std::span<const double>());
 }
 
 void HistoryRecord::read_here(ByteReader& in, Terms& terms) {
-  LawHistory* const history = terms.history();
-  const std::span<double> values = history ? history->values() : std::span<double>();
+  MaterialPoints* const of_laws = terms.material_points();
+  const std::span<double> values = of_laws ? of_laws->values() : std::span<double>();
   if (in.value<std::uint64_t>() != values.size()) refuse();
   in.bytes(values.data(), values.size_bytes());
-  if (history) terms.history_restored();
+  if (of_laws) terms.history_restored();
 }
 
 }  // namespace perikit

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "operators/law_history.hpp"
+#include "operators/material_points.hpp"
 #include "problem/snapshot.hpp"
 #include "terms/terms.hpp"
 
@@ -31,7 +31,7 @@ class HistoryRecord {
   static void read_here(ByteReader& in, Terms& terms);
 
  private:
-  const LawHistory* history_;
+  const MaterialPoints* history_;
   std::size_t components_;            ///< numbers an evaluation point
   std::vector<HistoryPoint> points_;  ///< those that no other rank has
   std::vector<std::int64_t> numbers_;

@@ -173,7 +173,7 @@ std::string Simulation::summary() {
     warnings.insert(warnings.end(), more.begin(), more.end());
   if (!loose_.empty())
     warnings.push_back(named("loose_pieces", fmt::format("nothing but weak springs ({:g} of a point's stiffness) holds {}", scene_.weak_springs, loose_)));
-  if (problem_->terms().history() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from))
+  if (problem_->terms().material_points() && carried_.find("history") == std::string::npos && (!scene_.initial_displacement.empty() || scene_.initial_from))
     warnings.push_back(named("first_step", "the displacement at the start is one increment from the undeformed body for materials whose stress depends on the path"));
   for (const std::string& note : problem_->notes()) lines.push_back(fmt::format("side          {}", note));
   for (const auto& [label, note] : report.notes) lines.push_back(fmt::format("{:<13} {}", label, note));

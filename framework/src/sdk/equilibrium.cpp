@@ -17,8 +17,9 @@ Equilibrium::Equilibrium(Problem& problem, double tolerance)
     : problem_(problem), tolerance_(tolerance), u_(problem.make_field()), scratch_(problem.make_field()),
       free_(problem.constraints().free()), external_(problem.loads().any() ? problem.state().external_force() : FieldView{}) {}
 
-void Equilibrium::begin(double t, ConstFieldView u) {
+void Equilibrium::begin(double t, ConstFieldView u, double time_step) {
   t_ = t;
+  time_step_ = time_step;
   copy(u, u_);
   if (external_.data && !problem_.loads().follow()) problem_.loads().evaluate(t, external_);
   Field noise = problem_.make_field();

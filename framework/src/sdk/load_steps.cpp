@@ -166,12 +166,12 @@ class LoadSteps {
     if (extrapolate) combine(1, u_, span / last_span(), last_increment_, start_);
     equilibrium_.stage("");
     equilibrium_.note(fmt::format("step {}  t = {:.9g}", state_.step + 1, t));
-    return find(t, extrapolate);
+    return find(span, extrapolate);
   }
 
-  /// The equilibrium at t from start_.
-  Solution find(double t, bool extrapolated) {
-    equilibrium_.begin(t, start_);
+  /// The equilibrium so far from the position, from start_.
+  Solution find(double span, bool extrapolated) {
+    equilibrium_.begin((position() + span) / planned(), start_, span / planned());
     Solution solution = solver_.solve(equilibrium_, extrapolated);
     if (!solution.converged) return solution;
     // Forces and energy of exactly this state, and the judgement of this class rather than the solver's.
@@ -203,7 +203,7 @@ class LoadSteps {
     take();
     continues_ = true;
     bool settled = false;
-    for (std::int64_t round = 1; !settled && problem_.advance(round == 1 ? span / planned() : 0); ++round) {
+    for (std::int64_t round = 1; !settled && problem_.update_bonds(equilibrium_.at(u_), round == 1 ? span / planned() : 0); ++round) {
       continues_ = false;
       solver_.bonds_changed();
       solution.converged = equilibrium_.residual(u_, residual_, &energies.strain);
@@ -228,7 +228,7 @@ class LoadSteps {
       }
       const double held = energies.strain - energies.external_work;
       copy(u_, start_);
-      const Solution again = find(t, false);
+      const Solution again = find(span, false);
       solution.iterations += again.iterations;
       solution.converged = again.converged;
       solution.failure = again.failure;
@@ -246,6 +246,7 @@ class LoadSteps {
     state_.time = position() / planned();
     ++state_.step;
     solver_.accepted(problem_, u_);
+    problem_.accept();
     watch_stability();
     observer_.log(equilibrium_.take_notes());
     observer_.wants_sample(state_.step, state_.time);
@@ -276,6 +277,7 @@ class LoadSteps {
   }
 
   void give_up() {
+    problem_.revert();
     if (bonds_.empty()) return;
     state_.energies = first_;
     copy(first_u_, u_);

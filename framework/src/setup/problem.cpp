@@ -189,8 +189,8 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
   return consistency;
 }
 
-/// Refuses laws with history where the path has no steps, and where forces are not the derivative of their work.
-void refuse_history(const Scene& scene, const Laws& laws, const Formulation& formulation, bool quasi_static) {
+/// Refuses laws with history where forces are not the derivative of their work.
+void refuse_history(const Scene& scene, const Laws& laws, const Formulation& formulation) {
   const auto sources = materials(scene);
   for (std::size_t id = 0; id < sources.size(); ++id) {
     if (laws.records()[id].material->state_components(laws.space()) == 0) continue;
@@ -199,9 +199,6 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
       throw InputError(part.values.position("type"), part.values.path() + ".type",
                        fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
     };
-    if (quasi_static)
-      refuse(fmt::format("integrator \"{}\", whose iterations are no steps of a path", scene.integrator->type),
-             "an explicit integrator, or another material");
     if (formulation.force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
   }
 }
@@ -222,7 +219,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   refuse_stress(scene, body, of_terms.formulation);
   steps.begin("laws");
   parts.laws = build_laws(scene, factory, body, parts.images != nullptr);
-  refuse_history(scene, *parts.laws, of_terms.formulation, quasi_static);
+  refuse_history(scene, *parts.laws, of_terms.formulation);
   steps.begin(fmt::format("families of {} points", body.points()));
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   refuse_order(scene, of_terms.formulation, *parts.families);

@@ -32,6 +32,8 @@ class EvaluationSpace {
   virtual void complete(GroupMarks& marks) const { mark_whole_runs(1, marks); }
   /// The numbers of evaluation points lie below this.
   virtual std::size_t numbers() const noexcept = 0;
+  /// Which of several evaluation points of its owner has this number, where they are parts of its family.
+  virtual std::int64_t which(std::int64_t) const noexcept { return 0; }
   /// What follows from the bonds of these points is to be made anew.
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
   /// Weights of evaluation points may be multiplied by factors, of which there are so many; 0: they may not. Bonds of a cloud: by

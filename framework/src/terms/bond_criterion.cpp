@@ -232,7 +232,7 @@ void BondCriterion::collect(const Configuration& at, const GroupMarks& owners, c
   samples_.clear(kept);
   if (formulation_.pairs) samples_.want(looked_at_);  // of others evaluation points are those of groups
   for (const auto& term : terms_)
-    if (BreakableTerm* const bonds = term->breakable()) bonds->add_bonds(at.moved_to(at.u()), {&owners, &wide}, samples_);
+    if (BreakableTerm* const bonds = term->breakable()) bonds->add_bonds(at, {&owners, &wide}, samples_);
   samples_.merge();
 }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 
 #include "assembly/bond_assembly.hpp"
 #include "assembly/element_assembly.hpp"
@@ -17,7 +16,7 @@ Mechanics::Mechanics(const SpaceParts& parts) : parts_(parts) {
     laminates_ = std::make_unique<Laminates>(parts_.interfaces, parts.families.body().stride(), space_->numbers());
     find_laminates(laminates_->near(), false);
   }
-  if (parts_.history()) history_ = std::make_unique<LawHistory>(parts_.laws.state_components(), space_->numbers());
+  points_ = std::make_unique<MaterialPoints>(parts_.laws, space_->numbers());
 }
 
 void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
@@ -33,8 +32,9 @@ void Mechanics::balance(std::shared_ptr<CloudConsistency> consistency) {
 
 BatchWork Mechanics::work(const Configuration& at, BatchTask task) const noexcept {
   task.selective = parts_.formulation.selective();
-  task.history = history_.get();
+  task.points = points_.get();
   task.time_step = at.time_step();
+  task.ends_step = at.ends_step();
   task.laminates = laminates_.get();
   return {parts_.laws, task};
 }
@@ -75,19 +75,17 @@ std::vector<HistoryPlace> Mechanics::history_points() {
     return !parts_.laws.same(owner, far) && !(parts_.laws.has_incomplete_points() && (parts_.laws.incomplete(owner) || parts_.laws.incomplete(far)));
   };
   std::vector<HistoryPlace> points;
-  std::map<std::int32_t, std::int64_t> parts;  // so far, of those whose evaluation points are parts of their families
   const std::size_t groups = body.stride() / padding;
   for (std::size_t first = 0; first < groups; first += at_once) {
     GroupMarks marks(groups, 0);
     std::fill_n(marks.begin() + static_cast<std::ptrdiff_t>(first), std::min(at_once, groups - first), whole_group);
     const GroupMarks near = parts_.families.around(marks);
-    parts.clear();
     // Parts of families that have become too poor for a gradient have no weight, until so many bonds have failed that one of them is all
     // that its point has. Their history goes on meanwhile.
     for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near, !of_bonds && parts_.formulation.weighted != nullptr)) {
       const bool own = body.owns(static_cast<std::size_t>(found.owner));
       const HistoryPoint point{place(found.owner), of_bonds ? place(found.far) : -1,
-                               of_bonds ? std::int64_t{0} : parts[found.owner]++};
+                               of_bonds ? std::int64_t{0} : space_->which(found.number)};
       points.push_back({point, found.number, own});
       if (found.other_number >= 0 && two_states(found)) points.push_back({{point.owner, point.far, point.which + 1}, found.other_number, own});
     }
@@ -160,6 +158,7 @@ std::int64_t Mechanics::add_forces(const Configuration& at, const Region& region
   pass.motion = at.motion();
   if (pass.motion && !space_->moves_points()) pass.motion->finish();
   space_->run(pass);
+  if (at.ends_step() && region.whole() && pass.bad < 0) points_->step_ended();
   return pass.bad;
 }
 
@@ -241,11 +240,35 @@ int Mechanics::coupling_reach() const noexcept {
   return parts_.formulation.bond && parts_.formulation.far_share > 0 ? 3 : 2;
 }
 
-std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) const {
+std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) {
+  const RememberedPoints remembered{*points_, [this](const BlockRows& of) { return numbers_by_row(of); }};
   return with_dimension(parts_.families.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> {
-    if (parts_.formulation.bond) return std::make_unique<BondAssembly<d>>(parts_, rows);
-    return std::make_unique<ElementAssembly<d>>(parts_, rows);
+    if (parts_.formulation.bond) return std::make_unique<BondAssembly<d>>(parts_, remembered, rows);
+    return std::make_unique<ElementAssembly<d>>(parts_, remembered, rows);
   });
+}
+
+std::vector<std::int64_t> Mechanics::numbers_by_row(const BlockRows& rows) {
+  const std::vector<HistoryPlace> known = history_points();   // assembled tangents have the whole body: places are indices
+  const auto number_of = [&](const HistoryPoint& point) {
+    const auto at = std::ranges::lower_bound(known, point, {}, &HistoryPlace::point);
+    return at != known.end() && at->point == point ? at->number : std::int64_t{-1};
+  };
+  const auto parts = static_cast<std::size_t>(parts_.formulation.parts(rows.body().dimension()));
+  std::vector<std::int64_t> numbers;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const auto p = static_cast<std::int64_t>(rows.point(r));
+    for (std::size_t w = 0; w < parts; ++w) numbers.push_back(number_of({p, -1, static_cast<std::int64_t>(w)}));
+    if (parts > 0) continue;
+    for (const std::int32_t neighbour : rows.neighbours(r)) {
+      // A bond that is evaluated once for both ends has one state, or a second one for the end that does not have its number.
+      const auto q = static_cast<std::int64_t>(rows.point(static_cast<std::size_t>(neighbour)));
+      std::int64_t number = number_of({p, q, 0});
+      if (number < 0) number = number_of({q, p, 1});
+      numbers.push_back(number >= 0 ? number : number_of({q, p, 0}));
+    }
+  }
+  return numbers;
 }
 
 std::int64_t Mechanics::stiffness_near_laminates(ConstFieldView u, FieldView stiffness) {
@@ -303,7 +326,7 @@ std::unique_ptr<VolumetricRows> Mechanics::make_volumetric_rows() {
 void Mechanics::report(ModelReport& report) const {
   space_->report(report);
   report.resting += space_->resting_counts();
-  if (history_) report.bytes += history_->bytes();
+  report.bytes += points_->bytes();
   if (consistency_) consistency_->report(report);
   if (!laminates_) return;
   report.bytes += laminates_->bytes();

@@ -19,10 +19,10 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   AssembledTerm* assembled() noexcept override { return this; }
   SampledTerm* sampled() noexcept override { return this; }
   BreakableTerm* breakable() noexcept override { return this; }
-  StatefulTerm* stateful() noexcept override { return history_ ? this : nullptr; }
+  StatefulTerm* stateful() noexcept override { return points_->remember() ? this : nullptr; }
 
   int coupling_reach() const noexcept override;
-  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
+  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) override;
   std::unique_ptr<VolumetricRows> make_volumetric_rows() override;
   std::int64_t sample(const Configuration& at, PointSamples& samples) override;
   std::int64_t forces_and_samples(const Configuration& at, const ForceSum& sum, PointSamples& samples) override;
@@ -31,7 +31,7 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   void add_bonds(const Configuration& at, const Region& region, BondSamples& samples) override;
   void screen(BondScreen* screen) override { screen_ = screen; }
   PointFlux point_flux() const noexcept override { return space_->point_flux(); }
-  LawHistory& history() noexcept override { return *history_; }
+  MaterialPoints& points() noexcept override { return *points_; }
   void history_restored() override { space_->history_restored(); }
   std::vector<HistoryPlace> history_points() override;
   bool dissipates() const noexcept override { return parts_.laws.dissipates(); }
@@ -46,6 +46,8 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.
   void find_laminates(GroupMarks marks, bool again);
   class LaminateVolumes;
+  /// See RememberedPoints.
+  std::vector<std::int64_t> numbers_by_row(const BlockRows& rows);
   /// stiffness <- that of the volumes of points whose evaluation points may be laminates (VolumetricRows), where it is not 0. Field index of
   /// an inadmissible point, or -1.
   std::int64_t stiffness_near_laminates(ConstFieldView u, FieldView stiffness);
@@ -54,7 +56,7 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;
-  std::unique_ptr<LawHistory> history_;
+  std::unique_ptr<MaterialPoints> points_;
   std::unique_ptr<Laminates> laminates_;
   BondScreen* screen_ = nullptr;
   std::shared_ptr<const CloudConsistency> consistency_;

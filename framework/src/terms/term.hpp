@@ -10,7 +10,7 @@
 #include "families/families.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/group_energy.hpp"
-#include "operators/law_history.hpp"
+#include "operators/material_points.hpp"
 #include "operators/point_flux.hpp"
 #include "operators/report.hpp"
 #include "operators/samples.hpp"
@@ -71,7 +71,7 @@ class AssembledTerm {
   /// The tangent couples two points only where a chain of at most so many bonds joins them.
   virtual int coupling_reach() const noexcept = 0;
   /// The rows outlive the assembly.
-  virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const = 0;
+  virtual std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) = 0;
   /// What of the tangent resists changes of the volumes of points; null where volumes are not those of points. The term must outlive it.
   virtual std::unique_ptr<VolumetricRows> make_volumetric_rows() { return nullptr; }
 };
@@ -108,7 +108,7 @@ class BreakableTerm {
 class StatefulTerm {
  public:
   virtual ~StatefulTerm() = default;
-  virtual LawHistory& history() noexcept = 0;
+  virtual MaterialPoints& points() noexcept = 0;
   /// Its values were replaced.
   virtual void history_restored() = 0;
   /// Its evaluation points here, ascending. Failed bonds have none.

@@ -220,7 +220,7 @@ EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView 
   std::int64_t bad = -1;
   for (std::size_t t = 0; t < terms_.size() && bad < 0; ++t) {
     const StatefulTerm* const remembers = terms_[t]->stateful();
-    const bool dissipates = remembers && remembers->dissipates() && at.time_step() > 0;
+    const bool dissipates = remembers && remembers->dissipates() && at.ends_step();
     if (energy || dissipates) energies_[t].assign(groups(), {});
     bad = add(*terms_[t], ForceSum{force, energy || dissipates ? std::span(energies_[t]) : std::span<GroupEnergy>(), energy != nullptr});
     if (energy) add_owned(energies_[t], &GroupEnergy::stored, stored);
@@ -261,7 +261,7 @@ EvaluationStatus Terms::forces_and_samples(const Configuration& at, FieldView fo
 
 EvaluationStatus Terms::renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
                                      FieldView force, double* energy) {
-  if (!failing_ || !parts_.skip || history()) return forces(at, force, energy);
+  if (!failing_ || !parts_.skip || stateful()) return forces(at, force, energy);
   const Families& families = *parts_.families;
   const Body& body = families.body();
   const int steps = coupling_reach(), reach = std::max(1, steps - 1);   // the latter of the evaluation points at a point
@@ -359,7 +359,7 @@ Terms::Assemblies& Terms::assemblies() {
   if (!assemblies_) {
     assemblies_ = std::make_unique<Assemblies>(Assemblies{BlockRows(*parts_.families), {}, parts_.families->version()});
     for (const auto& term : terms_) {
-      const AssembledTerm* const assembled = term->assembled();
+      AssembledTerm* const assembled = term->assembled();
       assemblies_->all.push_back(assembled ? assembled->make_assembly(assemblies_->rows) : std::make_unique<PointBlocks>(*term, assemblies_->rows));
     }
     assemblies_->steps = coupling_reach();
@@ -395,7 +395,7 @@ Field Terms::shape_tensor_condition() const {
 
 Field Terms::damage() const { return damage_field(*parts_.families); }
 
-LawHistory* Terms::history() const noexcept { return stateful() ? &stateful()->history() : nullptr; }
+MaterialPoints* Terms::material_points() const noexcept { return stateful() ? &stateful()->points() : nullptr; }
 
 void Terms::history_restored() {
   if (stateful()) stateful()->history_restored();
@@ -403,16 +403,25 @@ void Terms::history_restored() {
 
 std::vector<HistoryPlace> Terms::history_points() const { return stateful() ? stateful()->history_points() : std::vector<HistoryPlace>(); }
 
-double Terms::take_dissipated() { return total_over_ranks(std::exchange(dissipated_, {})); }
+double Terms::accept() {
+  if (!stateful()) return 0;
+  stateful()->points().accept();
+  return stateful()->dissipates() ? total_over_ranks(std::exchange(dissipated_, {})) : 0;
+}
+
+void Terms::revert() {
+  dissipated_ = {};
+  if (stateful()) stateful()->points().revert();
+}
 
 void Terms::bonds_changed(std::span<const std::int32_t> points) {
   for (const auto& term : terms_)
     if (BreakableTerm* const bonds = term->breakable()) bonds->bonds_changed(points);
 }
 
-BondUpdate Terms::update_bonds(const Configuration& at, const StepInside& step) {
+BondUpdate Terms::update_bonds(const Configuration& at, double elapsed, const StepInside& step) {
   if (!failing_) return {};
-  BondUpdate update = failing_->fracture.update(at, step, failing_->body(*this));
+  BondUpdate update = failing_->fracture.update(at, elapsed, step, failing_->body(*this));
   failing_->ends = update.ends;
   return update;
 }

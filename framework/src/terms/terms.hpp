@@ -11,7 +11,7 @@
 #include "families/step_inside.hpp"
 #include "model/formulation.hpp"
 #include "operators/group_energy.hpp"
-#include "operators/law_history.hpp"
+#include "operators/material_points.hpp"
 #include "operators/report.hpp"
 #include "operators/samples.hpp"
 #include "perikit/core/block_matrix.hpp"
@@ -99,18 +99,19 @@ class Terms {
   /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
   Field damage() const;
   ModelReport report() const;
-  /// Of laws that have one, at the evaluation points; else null. After its values were replaced: history_restored.
-  LawHistory* history() const noexcept;
+  /// Where laws remember something; null where none does. After their values were replaced: history_restored.
+  MaterialPoints* material_points() const noexcept;
   void history_restored();
   /// Its evaluation points, ascending. Failed bonds have none.
   std::vector<HistoryPlace> history_points() const;
-  /// What laws dissipate in the step that the last evaluation of forces ended, over all ranks [J]; once, then 0 until the next.
-  double take_dissipated();
+  /// The step that the last evaluation of forces ended is done, or given up: see Problem. What laws dissipated in it, over all ranks [J].
+  double accept();
+  void revert();
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
   /// Lowers the integrity of bonds that are beyond their limit, and recomputes what depends on them. To be called after
-  /// every step. Where `step` is given, bonds fail inside of it, and displacements follow what it does.
-  BondUpdate update_bonds(const Configuration& at, const StepInside& step = {});
+  /// every step, with its length [s] (0 in later rounds of quasi-static steps). Where `step` is given, bonds fail inside of it, and displacements follow what it does.
+  BondUpdate update_bonds(const Configuration& at, double elapsed = 0, const StepInside& step = {});
   // Bonds that weakened in the last update outside of a step: see WeakeningBonds.
   /// Whether some of them may be forecast.
   bool settling() const noexcept;

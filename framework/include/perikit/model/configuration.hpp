@@ -9,11 +9,11 @@ namespace perikit {
 
 class Configuration {
  public:
-  /// time: [s], in quasi-static runs the load parameter. time_step > 0 [s]: u ends a step of this length, and laws with history put theirs aside;
-  /// 0: no step ends, and nothing is kept. velocity: [m/s], of the points that this rank owns; without data where there is none. The fields must
+  /// time: [s], in quasi-static runs the load parameter. time_step > 0 [s]: u ends a step of this length, and laws put what they remember at its end
+  /// aside; 0: no step ends. velocity: [m/s], of the points that this rank owns; without data where there is none. The fields must
   /// outlive the configuration.
   Configuration(ConstFieldView u, double time, double time_step = 0, ConstFieldView velocity = {}) noexcept
-      : u_(u), velocity_(velocity), time_(time), time_step_(time_step) {}
+      : u_(u), velocity_(velocity), time_(time), time_step_(time_step), ends_step_(time_step > 0) {}
 
   /// Displacements [m], all of which are there when it returns.
   ConstFieldView u() const {
@@ -24,9 +24,14 @@ class Configuration {
   ConstFieldView velocity() const noexcept { return velocity_; }
   double time() const noexcept { return time_; }
   double time_step() const noexcept { return time_step_; }
+  bool ends_step() const noexcept { return ends_step_; }
 
-  /// The same time at other displacements, where no step ends.
-  Configuration moved_to(ConstFieldView u) const noexcept { return {u, time_, 0, velocity_}; }
+  /// The same time and step at other displacements, where the step does not end: what laws would remember is not kept.
+  Configuration moved_to(ConstFieldView u) const noexcept {
+    Configuration other(u, time_, time_step_, velocity_);
+    other.ends_step_ = false;
+    return other;
+  }
 
   // Displacements of which some are not there yet: for loops that begin with the points whose displacements are.
   /// The same where displacements of points of other ranks are on their way.
@@ -48,6 +53,7 @@ class Configuration {
 
   ConstFieldView u_, velocity_;
   double time_, time_step_;
+  bool ends_step_;
   Arrival* arrival_ = nullptr;
   PointMotion* motion_ = nullptr;
 };

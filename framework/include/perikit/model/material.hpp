@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <span>
 #include <string_view>
 
 #include "perikit/core/space.hpp"
@@ -16,6 +17,7 @@ struct MaterialTraits {
   bool isotropic = true;
   bool hyperelastic = true;   ///< P = dpsi/dF; false for rate laws, whose psi is the work done so far
   bool green_linear = false;  ///< S is linear in the Green strain E, 3 kappa I of E = I (kappa of Moduli::bulk): P(a F) = a^3 P(F) + 3 kappa a (a^2 - 1)/2 F
+  bool symmetric_tangent = true;   ///< A_ij,kl = A_kl,ij: of hyperelastic laws always; of others where they say so
   bool dissipates = false;    ///< psi is the energy that is stored; of laws with history, which say what their steps dissipate
 };
 
@@ -79,6 +81,19 @@ struct MaterialInput {
   std::function<double(std::string_view)> value;
 };
 
+/// What a law remembers at an evaluation point, zero at the start.
+struct StateVariable {
+  std::string_view name;   ///< as output fields are called: lower case and underscores
+  std::string_view unit;   ///< "-" without one
+  int components = 1;      ///< 1, or those of a symmetric or full tensor of the space
+};
+
+constexpr int components_of(std::span<const StateVariable> state) noexcept {
+  int components = 0;
+  for (const StateVariable& variable : state) components += variable.components;
+  return components;
+}
+
 class Material {
  public:
   virtual ~Material() = default;
@@ -87,8 +102,9 @@ class Material {
   /// (nu >= 1/2, negative modulus).
   virtual void constants(const MaterialInput& input, double* out) const = 0;
   virtual Moduli small_strain(const double* constants) const noexcept = 0;
-  /// Doubles of history per evaluation point; 0: the law depends on F alone. Laws with history run explicitly only. Fresh history is zero.
-  virtual int state_components(Space) const noexcept { return 0; }
+  /// What it remembers, in the order of MaterialBatch::state_old; empty: the law depends on F alone.
+  virtual std::span<const StateVariable> state(Space) const noexcept { return {}; }
+  int state_components(Space space) const noexcept { return components_of(state(space)); }
   /// Overwrites every wanted output for all n points. P(0) is exactly zero.
   virtual Status evaluate(Space space, const MaterialBatch& batch) const noexcept = 0;
 

@@ -40,7 +40,7 @@ struct LawScratch {
   AlignedVector<double> history;         ///< of laws that have one
 };
 
-/// LawHistory of the lanes of a batch: component c of lane l is [c * stride + l]. Batches that may mix laws have stride batch_points.
+/// What laws remember, of the lanes of a batch: component c of lane l is [c * stride + l]. Batches that may mix laws have stride batch_points.
 struct LawState {
   const double* begin = nullptr;         ///< at the beginning of the step; null: fresh
   double* end = nullptr;                 ///< where to put it if the step ends here; null: not wanted
@@ -73,6 +73,7 @@ class Laws {
   bool single() const noexcept { return single_; }
   bool constant_tangent() const noexcept;
   bool objective() const noexcept;
+  bool symmetric_tangent() const noexcept;
   /// Doubles of history per evaluation point, the most of any law; 0 where every law depends on F alone.
   int state_components() const noexcept { return state_; }
   /// Some law says what its steps dissipate.

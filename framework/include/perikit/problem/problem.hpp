@@ -85,12 +85,22 @@ class Problem {
   /// False where the stiffness can change during the run (nonlinear laws, failing bonds): estimates of it do not last.
   virtual bool constant_stiffness() const noexcept = 0;
 
-  /// After a finished step: the history that its last evaluate_forces put aside, damage. Returns true when bonds changed.
-  /// velocity: of explicit schemes, of the half step that led here. Bonds that are found beyond their limit then failed inside of
-  /// the step: the internal forces, the energies and this velocity become what they are with bonds that acted until then. To be
-  /// called right after evaluate_forces, before anything is made of its forces. Quasi-static runs call it at every equilibrium
-  /// of a step, after the first one with time_step = 0: as long as bonds change, the step is not over.
-  virtual bool advance(double time_step, FieldView velocity = {}) = 0;
+  /// The step that the last evaluation of forces ended is done: what laws remember at its end is where the next one begins, and what they dissipated
+  /// counts. Nothing where none has ended since the last one. All ranks must call it.
+  virtual void accept() = 0;
+  /// That step is given up: what laws remember is what it was at its beginning.
+  virtual void revert() = 0;
+  /// With [damage]: lets bonds fail that are beyond their limits, after a step that took `elapsed` [s]. Returns true when bonds changed. In quasi-static runs
+  /// `at` is an equilibrium, which is no longer one then: as long as bonds change, the step is not over, and later rounds have elapsed = 0.
+  /// velocity: of explicit schemes, of the half step that led here. Bonds then failed inside of the step: the displacements and internal forces of the state, the
+  /// energies and this velocity become what they are with bonds that acted until then. To be called right after the evaluation of
+  /// the forces and `accept`, before anything is made of these forces. All ranks must call it.
+  virtual bool update_bonds(const Configuration& at, double elapsed, FieldView velocity = {}) = 0;
+  /// Both, at the end of a step of explicit schemes.
+  bool advance(double time_step, FieldView velocity = {}) {
+    accept();
+    return update_bonds(configuration(), time_step, velocity);
+  }
   /// Bonds that have failed so far, of all ranks. All ranks must call it.
   virtual std::int64_t failed_bonds() const { return 0; }
   /// Bonds that weaken gradually, for solvers that forecast how far they do; as long as it lives, advance() leaves that to it. Null where none

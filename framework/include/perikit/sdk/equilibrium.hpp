@@ -22,13 +22,13 @@ class Equilibrium {
   /// Of `problem` to the relative `tolerance`.
   Equilibrium(Problem& problem, double tolerance);
 
-  /// Loads and prescribed displacements are those at t from now on; `u` are the start values [m].
-  void begin(double t, ConstFieldView u);
+  /// Loads and prescribed displacements are those at t from now on, to which a step of this length leads; `u` are the start values [m].
+  void begin(double t, ConstFieldView u, double time_step = 0);
 
   Problem& problem() noexcept { return problem_; }
   double parameter() const noexcept { return t_; }
-  /// Displacements u at the present load parameter.
-  Configuration at(ConstFieldView u) const noexcept { return {u, t_}; }
+  /// Displacements u at the end of the present step.
+  Configuration at(ConstFieldView u) const noexcept { return {u, t_, time_step_}; }
   double tolerance() const noexcept { return tolerance_; }
   /// Start values of the solver, then its answer [m]; suited for Problem::evaluate_forces. Prescribed components are those of the
   /// start until `impose`.
@@ -75,7 +75,7 @@ class Equilibrium {
   std::int64_t actions_ = 0;   ///< of the tangent since the last note
   std::chrono::steady_clock::time_point logged_ = std::chrono::steady_clock::now();
   double tolerance_;
-  double t_ = 0, norm_ = 0, reference_ = 0, stiffness_ = 0;
+  double t_ = 0, time_step_ = 0, norm_ = 0, reference_ = 0, stiffness_ = 0;
   Field u_, scratch_;
   ConstFieldView free_;
   FieldView external_;   ///< no data without loads

@@ -3,16 +3,16 @@
 ///
 ///   struct MyRateLaw {
 ///     static constexpr MaterialTraits traits{.constants = 2, .hyperelastic = false};
-///     template <class S> static constexpr int state_components = 7;           // doubles of history per evaluation point
-///     /// The step that begins at `state`: a point law with P(H, k) and tangent(H, k), and with
-///     /// update(H, k) -> HistoryUpdate<T, S, 7>, H at the end of the step.
-///     template <class S, class T> auto after(const std::array<T, state_components<S>>& state) const noexcept;
-///     /// or, for laws of rates: time_step is the length of the step [s], 0 where no step is taken (samples, tangents), so that
-///     /// nothing relaxes
-///     template <class S, class T> auto after(const std::array<T, state_components<S>>& state, double time_step) const noexcept;
+///     /// What it remembers, by name.
+///     template <class S> static constexpr std::array state{StateVariable{"stress", "Pa", symmetric_size<S>}, StateVariable{"energy", "J/m^3", 1}};
+///     /// The step that begins at these values: a point law with P(H, k) and tangent(H, k), and with
+///     /// update(H, k) -> HistoryUpdate<T, S, state_size<MyRateLaw, S>()>, H at the end of the step.
+///     template <class S, class T> auto after(const std::array<T, components_of(state<S>)>& begin) const noexcept;
+///     /// or, for laws of rates: time_step is the length of the step [s], 0 where no step is taken (samples), so that nothing relaxes
+///     template <class S, class T> auto after(const std::array<T, components_of(state<S>)>& begin, double time_step) const noexcept;
 ///   };
 ///
-/// Fresh history is all zeros: store differences from it (U - I, not U).
+/// All values are zero at the start: store differences from it (U - I, not U).
 ///
 /// Energy: the work of P on a step is what psi grows by and what is dissipated. A law that loses energy (viscosity, plasticity)
 /// declares traits.dissipates, lets psi be what it stores and puts the rest into HistoryUpdate::dissipated; the run adds it up.
@@ -22,6 +22,7 @@
 
 #include "perikit/core/simd.hpp"
 #include "perikit/core/tensor.hpp"
+#include "perikit/model/material.hpp"
 
 namespace perikit {
 
@@ -36,18 +37,18 @@ struct HistoryUpdate {
 
 template <class Law>
 concept HasHistory = requires {
-  Law::template state_components<Solid>;
+  Law::template state<Solid>;
 };
 
 template <class Law>
-concept HasTimeStep = requires(const Law& law, const std::array<Pack, Law::template state_components<Solid>>& state) {
+concept HasTimeStep = requires(const Law& law, const std::array<Pack, components_of(Law::template state<Solid>)>& state) {
   law.template after<Solid>(state, 1.0);
 };
 
 template <class Law, class S>
 constexpr int state_size() noexcept {
   if constexpr (HasHistory<Law>)
-    return Law::template state_components<S>;
+    return components_of(Law::template state<S>);
   else
     return 0;
 }

@@ -70,9 +70,9 @@ consteval void check_energy_and_stress() {
 /// A law with history: the law of a step.
 template <class Law>
 consteval void check_steps() {
-  using State = std::array<Pack, Law::template state_components<Solid>>;
+  using State = std::array<Pack, components_of(Law::template state<Solid>)>;
   static_assert(HasTimeStep<Law> || requires(const Law& law, const State& state) { law.template after<Solid>(state); },
-                "a law with history needs template <class S, class T> auto after(const std::array<T, state_components<S>>& state) const noexcept, "
+                "a law with history needs template <class S, class T> auto after(const std::array<T, components_of(state<S>)>& begin) const noexcept, "
                 "the law of the step that begins at this state (perikit/sdk/history.hpp)");
 }
 
@@ -84,6 +84,9 @@ consteval bool check_law() {
                   "a law needs `void constants(const MaterialInput& input, double* k) const`, which writes what psi and P read");
     static_assert(requires(const Law& law, const double* k) { { law.small_strain(k) } -> std::convertible_to<Moduli>; },
                   "a law needs `Moduli small_strain(const double* k) const noexcept`, its Lame constants at rest");
+    static_assert(HasHistory<Law> || !requires { Law::template state_components<Solid>; },
+                  "a law with history names what it remembers: "
+                  "template <class S> static constexpr std::array state{StateVariable{\"stress\", \"Pa\", symmetric_size<S>}}");
     if constexpr (HasHistory<Law>) check_steps<Law>();
     else check_energy_and_stress<Law, std::array<Pack, Law::traits.constants>>();
   }

@@ -74,9 +74,15 @@ class LawMaterial final : public Material {
     }
   }
   Moduli small_strain(const double* k) const noexcept override { return law_.small_strain(k); }
-  int state_components(Space space) const noexcept override {
-    const int d = dimension(space);
-    return d == 3 ? state_size<Law, Solid>() : d == 2 ? state_size<Law, Plane>() : state_size<Law, Line>();
+  std::span<const StateVariable> state(Space space) const noexcept override {
+    if constexpr (HasHistory<Law>) {
+      const int d = dimension(space);
+      if (d == 3) return Law::template state<Solid>;
+      if (d == 2) return Law::template state<Plane>;
+      return Law::template state<Line>;
+    } else {
+      return {};
+    }
   }
 
   Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {

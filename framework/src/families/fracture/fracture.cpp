@@ -106,20 +106,19 @@ Fracture::Ties Fracture::ties(std::span<const Found> found) const {
   return ties;
 }
 
-BondUpdate Fracture::update(const Configuration& at, const StepInside& step, const Body& body) {
+BondUpdate Fracture::update(const Configuration& at, double elapsed, const StepInside& step, const Body& body) {
   const ConstFieldView u = at.u();
-  const double time_step = at.time_step();
   ++updates_;
   weakening_.clear();
   settling_.clear();
   std::vector<BondChange> changes = finder_->find(at);
   // Ranks see what bonds of their own points hold, but all must know which bonds fail.
   if (shared_.part() && !damage_.by_stretch() && on_any_rank(!changes.empty())) changes = shared_.of_all(changes);
-  if (gradual_) changes = gradual_->let_go(changes, time_step);
+  if (gradual_) changes = gradual_->let_go(changes, elapsed);
   if (!on_any_rank(!changes.empty())) return {};
   BondUpdate update;
   if (!step) {
-    if (time_step > 0) hastened_.forget();
+    if (elapsed > 0) hastened_.forget();
     if (!damage_.law->traits().bits) {
       std::vector<double> from;
       for (const BondChange& change : changes) from.push_back(families_.integrity(change.bond));
@@ -161,14 +160,14 @@ BondUpdate Fracture::update(const Configuration& at, const StepInside& step, con
     // The bonds act until they fail, at `moment`. A step has the forces of its beginning for the first half, and those of its end, which are to be
     // without these bonds, for the second: what the bonds owe, or gave too much, is an impulse. It acts where its forces were evaluated, as they have
     // no moment about other positions.
-    const double owed = (moment - 0.5) * time_step, end = early ? 0 : 1;
+    const double owed = (moment - 0.5) * elapsed, end = early ? 0 : 1;
     if (owed != 0) fill(0.0, force_);
     fail(of_half, at.moved_to(at_), owed != 0 ? FieldView(force_) : FieldView{}, body, update);
     if (owed == 0) continue;
     const double growth = step.act(force_, owed, moment);
     // It works at the velocity of its moment, and in the balance of a step at that of the end of the step that it belongs to. Where the second law
     // asks that nothing is gained, energies stay what they are.
-    if (!damage_.second_law) update.dissipated -= (moment - end) * time_step * owed * growth;
+    if (!damage_.second_law) update.dissipated -= (moment - end) * elapsed * owed * growth;
   }
   finish(update);
   return update;

@@ -36,8 +36,8 @@ class Fracture {
     /// What follows from the bonds of these points is to be computed anew.
     std::function<void(std::span<const std::int32_t> points)> changed;
   };
-  /// At the end of the step of `at`, which is none in quasi-static runs. Bonds of fragments fail too, but for those that must not. All ranks must call it.
-  BondUpdate update(const Configuration& at, const StepInside& step, const Body& body);
+  /// After a step of this length [s]; 0 in later rounds of quasi-static ones. Bonds of fragments fail too, but for those that must not. All ranks must call it.
+  BondUpdate update(const Configuration& at, double elapsed, const StepInside& step, const Body& body);
 
   // Of the bonds that weakened in the last update outside of a step, and have something left; on one rank.
   /// Whether some of them may be forecast.

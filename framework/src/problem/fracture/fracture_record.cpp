@@ -10,8 +10,8 @@
 
 namespace perikit {
 
-BondUpdate FractureRecord::update(Terms& terms, const Configuration& at, State& state, const StepInside& step) {
-  BondUpdate update = terms.update_bonds(at, step);
+BondUpdate FractureRecord::update(Terms& terms, const Configuration& at, double elapsed, State& state, const StepInside& step) {
+  BondUpdate update = terms.update_bonds(at, elapsed, step);
   account(update, state);
   return update;
 }

@@ -20,7 +20,7 @@ class FractureRecord {
   /// Null where bonds never fail.
   const BodyDamage* damage() const noexcept { return damage_.get(); }
   /// Lets bonds of `terms` fail at displacements as they see them; energies of the state follow. The rest: see Terms.
-  BondUpdate update(Terms& terms, const Configuration& at, State& state, const StepInside& step);
+  BondUpdate update(Terms& terms, const Configuration& at, double elapsed, State& state, const StepInside& step);
   /// Likewise lets bonds weaken to what they are at `forecast`. True when some did.
   bool weaken(Terms& terms, const Configuration& at, ConstFieldView forecast, State& state);
   /// How bonds failed so far, in words; empty where they never fail.

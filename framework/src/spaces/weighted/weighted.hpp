@@ -33,6 +33,7 @@ class Weighted final : public EvaluationSpace {
     else mark_whole_runs(body_.block_points() / padding, marks);
   }
   std::size_t numbers() const noexcept override { return numbers_; }
+  std::int64_t which(std::int64_t number) const noexcept override { return parts_ > 0 ? number % (8 * parts_) / 8 : 0; }   // all groups have as many
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override {
     return cloud_ && parts_ == 0 ? families_.bonds() : 0;

@@ -272,7 +272,7 @@ std::int64_t PairForces<D>::tangent(const Configuration& at, ConstFieldView w, c
 }
 
 template <int D>
-std::unique_ptr<Assembly> PairForces<D>::make_assembly(const BlockRows& rows) const {
+std::unique_ptr<Assembly> PairForces<D>::make_assembly(const BlockRows& rows) {
   return std::make_unique<PairAssembly<D>>(formulation_, PairPoints{fields_, scale_, dilatation_modulus_}, rows);
 }
 

@@ -30,7 +30,7 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   BreakableTerm* breakable() noexcept override { return this; }
 
   int coupling_reach() const noexcept override { return formulation_.dilatation ? 2 : 1; }
-  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const override;
+  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) override;
   /// strain_energy_density, and P where it is asked for.
   std::int64_t sample(const Configuration& at, PointSamples& samples) override;
   std::int64_t forces_and_samples(const Configuration& at, const ForceSum& sum, PointSamples& samples) override {

@@ -25,7 +25,7 @@ void ZeroEnergyPenalty::add_bonds(const Configuration& at, const Region& region,
   }
 }
 
-std::unique_ptr<Assembly> ZeroEnergyPenalty::make_assembly(const BlockRows& rows) const {
+std::unique_ptr<Assembly> ZeroEnergyPenalty::make_assembly(const BlockRows& rows) {
   return with_dimension(rows.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> { return std::make_unique<PenaltyAssembly<d>>(parts_, rows); });
 }
 

@@ -28,7 +28,7 @@ class ZeroEnergyPenalty : public Term, public AssembledTerm, public SampledTerm,
   BreakableTerm* breakable() noexcept final { return this; }
 
   int coupling_reach() const noexcept final { return 2; }
-  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) const final;
+  std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) final;
   std::int64_t sample(const Configuration& at, PointSamples& samples) final {
     add_density(at.u(), samples.strain_energy_density.data());
     return -1;

@@ -16,9 +16,11 @@ namespace {
 ///   dV/dt = (E - V)/tau,   dissipated power = 2 m (E - V) : dV/dt
 struct PartName {
   static constexpr MaterialTraits traits{.constants = 4, .hyperelastic = false, .dissipates = true};
-  /// Doubles of history at each evaluation point, all zero at the start: here those of V.
+  /// What is remembered at each evaluation point, zero at the start: here V.
   template <class S>
-  static constexpr int state_components = symmetric_size<S>;
+  static constexpr std::array state{StateVariable{"viscous_strain", "-", symmetric_size<S>}};
+  template <class S>
+  static constexpr int size = components_of(state<S>);
 
   /// What the law reads, from the parameters at one point; std::domain_error says what is wrong with them.
   void constants(const MaterialInput& input, double* k) const {
@@ -39,10 +41,10 @@ struct PartName {
 
     /// Energy, stress and history at the end of the step, and what it dissipates: the implicit Euler rule for V.
     template <class K>
-    HistoryUpdate<T, S, state_components<S>> update(const Tensor<T, S>& H, const K& k) const noexcept {
+    HistoryUpdate<T, S, size<S>> update(const Tensor<T, S>& H, const K& k) const noexcept {
       const auto& [lambda, mu, m, tau] = k;
       const Tensor<T, S> E = green_lagrange(H), spring = (1.0 / (1.0 + time_step / tau)) * (E - begin);   // E - V at the end
-      HistoryUpdate<T, S, state_components<S>> end;
+      HistoryUpdate<T, S, size<S>> end;
       end.psi = 0.5 * lambda * (trace(E) * trace(E)) + mu * inner(E, E) + m * inner(spring, spring);
       end.P = P(H, k);
       end.dissipated = (2.0 * time_step / tau) * m * inner(spring, spring);
@@ -66,8 +68,8 @@ struct PartName {
   };
 
   template <class S, class T>
-  Step<T, S> after(const std::array<T, state_components<S>>& state, double time_step) const noexcept {
-    return {unpack_symmetric<S>(state.data()), time_step};
+  Step<T, S> after(const std::array<T, size<S>>& begin, double time_step) const noexcept {
+    return {unpack_symmetric<S>(begin.data()), time_step};
   }
 };
 
@@ -90,6 +92,6 @@ PERIKIT_PLUGIN(registrar) {
                                    "density = 1000.0\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.3\nviscous_modulus = 2.0e6\nrelaxation_time = 0.01"},
                       .equations = "psi = lambda/2 (tr E)^2 + mu E : E + m (E - V) : (E - V),  dV/dt = (E - V)/tau,  E = (F^T F - I)/2",
                       .source = "the paper, with the number of the equation",
-                      .limits = "Explicit runs only: the stress depends on the path. Not for strong compression, where its stress falls."},
+                      .limits = "The stress depends on the path. Not for strong compression, where its stress falls."},
                      [](const ParameterValues&, const PartFactory&) { return std::make_unique<LawMaterial<PartName>>(); });
 }
