@@ -18,6 +18,9 @@ class StretchWatch {
 
   /// The largest eigenvalue, and the one that is tolerated.
   void estimated(StretchRange range, std::int64_t step, EigenvalueBounds eigenvalue, double tolerated);
+  /// A bound that is enough for the next estimate: half-way to what is tolerated, where the eigenvalue hardly rose with the stretches before the last one;
+  /// else 0, as it is to be found how it rises.
+  double enough(double tolerated) const;
   bool due(std::int64_t step) const noexcept { return static_cast<double>(step) >= next_; }
   /// Whether an estimate is needed.
   bool look(StretchRange range, std::int64_t step);
@@ -27,7 +30,7 @@ class StretchWatch {
   double change(StretchRange range) const;
 
   double &least_, &largest_;   ///< stretches at the last estimate
-  double& eigenvalue_;         ///< what it found; 0: a bound alone
+  double& eigenvalue_;         ///< the Ritz value that it found; 0: none yet
   double& power_;              ///< of the stretch, with which eigenvalues are expected to rise; 0: nothing is known
   double& margin_;             ///< of the change
   double& before_;             ///< change at the last look

@@ -306,8 +306,9 @@ void Verlet::run(Problem& problem, Observer& observer) {
   }
   stepper.start_speed();
   const auto estimate = [&] {
-    // That after a stretch tells how eigenvalues rise with stretches, too.
-    EigenvalueBounds found = eigenvalue_bounds(problem, state.displacement(), stretched > 0 ? 0 : most(), [&] { return !observer.interrupted(); });
+    // That after a stretch tells how eigenvalues rise with stretches, too, where they do.
+    const double enough = stretched > 0 ? watch.enough(most()) : most();
+    EigenvalueBounds found = eigenvalue_bounds(problem, state.displacement(), enough, [&] { return !observer.interrupted(); });
     if (found.given_up) return;
     due = 0;
     found.bound = std::max(found.bound, failed);
