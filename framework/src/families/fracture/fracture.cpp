@@ -275,18 +275,17 @@ void Fracture::try_to_fail(std::span<const std::vector<BondChange>> ties, const 
   if (ties.empty()) return;
   std::vector<BondChange> changes;
   for (const std::vector<BondChange>& tie : ties) changes.insert(changes.end(), tie.begin(), tie.end());
-  const std::size_t known = before.size();
-  const std::vector<std::int32_t> ends = lower_with_fragments(changes, before);
+  std::vector<BondChange> all = changes, had;
+  const std::vector<std::int32_t> ends = lower_with_fragments(all, had);
   body.changed(ends);
   const GroupMarks marks = dependent_on(ends, body);
   const double after = body.energy(at, marks);
-  std::vector<BondChange> tried(before.begin() + static_cast<std::ptrdiff_t>(known), before.end());
-  before.resize(known);
-  take_back(tried, body);
+  take_back(had, body);
   const double now = body.energy(at, marks);
   // Points that are inside out already say nothing.
   if (after <= now || !std::isfinite(now)) {
-    body.changed(lower_with_fragments(changes, before));
+    body.changed(families_.lower(all));
+    before.insert(before.end(), had.begin(), had.end());
     lawful.insert(lawful.end(), changes.begin(), changes.end());
     if (std::isfinite(after) && std::isfinite(now)) update.dissipated += now - after;
     return;
@@ -304,18 +303,18 @@ void Fracture::try_to_fail(std::span<const std::vector<BondChange>> ties, const 
 }
 
 /// before: in the order in which they fell; a bond of a fragment that had weakened fell twice.
-void Fracture::take_back(std::vector<BondChange>& before, const Body& body) {
-  std::ranges::reverse(before);
-  body.changed(families_.raise(before));
+void Fracture::take_back(std::span<const BondChange> before, const Body& body) {
+  body.changed(families_.raise(std::vector<BondChange>(before.rbegin(), before.rend())));
 }
 
-std::vector<std::int32_t> Fracture::lower_with_fragments(std::vector<BondChange> changes, std::vector<BondChange>& before) {
+std::vector<std::int32_t> Fracture::lower_with_fragments(std::vector<BondChange>& changes, std::vector<BondChange>& before) {
   std::vector<std::int32_t> all;
-  while (on_any_rank(!changes.empty())) {
-    for (const BondChange& change : changes) before.push_back({change.bond, families_.integrity(change.bond)});
-    const std::vector<std::int32_t> ends = families_.lower(changes);
+  for (std::size_t lowered = 0; on_any_rank(lowered < changes.size());) {
+    const std::span<const BondChange> next = std::span(changes).subspan(lowered);
+    for (const BondChange& change : next) before.push_back({change.bond, families_.integrity(change.bond)});
+    const std::vector<std::int32_t> ends = families_.lower(next);
     all.insert(all.end(), ends.begin(), ends.end());
-    changes.clear();
+    lowered = changes.size();
     if (gradual_) break;   // bonds of fragments fade
     for (const BondId bond : fragments(ends)) changes.push_back({bond, 0.0});
   }
@@ -323,11 +322,11 @@ std::vector<std::int32_t> Fracture::lower_with_fragments(std::vector<BondChange>
   return all;
 }
 
-void Fracture::lower(const std::vector<BondChange>& changes, const Configuration& at, FieldView force, bool account, const Body& body, BondUpdate& update) {
+void Fracture::lower(std::vector<BondChange> changes, const Configuration& at, FieldView force, bool account, const Body& body, BondUpdate& update) {
   if (!on_any_rank(!changes.empty())) return;
   const bool evaluates = force.data || account;
   std::vector<BondChange> before;
-  std::vector<std::int32_t> ends = lower_with_fragments(changes, before);
+  const std::vector<std::int32_t> ends = lower_with_fragments(changes, before);
   if (force.data && part_.size() == 0) part_ = families_.body().make_field(force.components);
   const FieldView part = force.data ? FieldView(part_) : FieldView{};
   GroupMarks marks;
@@ -339,8 +338,7 @@ void Fracture::lower(const std::vector<BondChange>& changes, const Configuration
     marks = dependent_on(ends, body);
     if (force.data) fill(0.0, part);
     stored = body.forces(at, marks, 1, part);  // so that what the bonds do not change is gone to the last bit
-    before.clear();
-    ends = lower_with_fragments(changes, before);
+    families_.lower(changes);
   }
   body.changed(ends);
   update.ends.insert(update.ends.end(), ends.begin(), ends.end());

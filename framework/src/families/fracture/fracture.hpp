@@ -78,10 +78,11 @@ class Fracture {
   void try_to_fail(std::span<const std::vector<BondChange>> ties, const Configuration& at, const Body& body, std::vector<BondChange>& lawful,
                    std::vector<BondChange>& before, BondUpdate& update);
   /// account: what the energy at `at` falls by is dissipated.
-  void lower(const std::vector<BondChange>& changes, const Configuration& at, FieldView force, bool account, const Body& body, BondUpdate& update);
-  /// In the families alone; returns the ends. before: what the bonds had, in the order in which they fell. All ranks must call it.
-  std::vector<std::int32_t> lower_with_fragments(std::vector<BondChange> changes, std::vector<BondChange>& before);
-  void take_back(std::vector<BondChange>& before, const Body& body);
+  void lower(std::vector<BondChange> changes, const Configuration& at, FieldView force, bool account, const Body& body, BondUpdate& update);
+  /// In the families alone; returns the ends. changes: those of fragments come after them; before: what the bonds had, in the order in which they fell.
+  /// All ranks must call it.
+  std::vector<std::int32_t> lower_with_fragments(std::vector<BondChange>& changes, std::vector<BondChange>& before);
+  void take_back(std::span<const BondChange> before, const Body& body);
   void finish(BondUpdate& update);
   /// What the criterion leaves of these bonds here, whatever they had before.
   std::vector<double> integrities(std::span<const BondId> bonds, const Configuration& at);
