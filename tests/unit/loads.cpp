@@ -90,6 +90,10 @@ TEST_CASE("force and body force: shared by volume") {
         doctest::Approx(2.0 * 2 * 0.25 * 20 * 1.0).epsilon(0.2));   // jitter may move a few points across the line
 }
 
+TEST_CASE("the overview has the loads of the end, which is the start where nothing runs") {
+  CHECK(plate("x > 5.5", 0.0, "force = [\"4 + t\", 0]")->overview().find("together (4, 0) N at the end") != std::string::npos);
+}
+
 TEST_CASE("traction: a set away from the face is refused") {
   CHECK_THROWS_AS(plate("x < 2", 0.0, "traction = [1, 0]\nface = \"+x\""), InputError);
 }

@@ -9,6 +9,7 @@
 
 #include "perikit/body/lattice.hpp"
 #include "run/simulation.hpp"
+#include "setup/conditions.hpp"
 
 namespace perikit {
 
@@ -146,9 +147,8 @@ std::string of_defaults(const Scene& scene) {
 
 std::string Simulation::overview() {
   const Body& body = problem_->body();
-  const ParameterValues& integrator = scene_.integrator->values;
-  const double end = traits_.quasi_static || !integrator.has("end_time") ? 1.0 : integrator.number("end_time");
-  return of_box(body) + of_sets(scene_, body) + of_masses(scene_, *problem_) + of_conditions(scene_, body) + of_loads(scene_, *problem_, end) + of_defaults(scene_);
+  return of_box(body) + of_sets(scene_, body) + of_masses(scene_, *problem_) + of_conditions(scene_, body) +
+         of_loads(scene_, *problem_, end_of(scene_, traits_.quasi_static)) + of_defaults(scene_);
 }
 
 }  // namespace perikit

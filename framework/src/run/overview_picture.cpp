@@ -9,6 +9,7 @@
 #include "output/picture/gnuplot.hpp"
 #include "output/plot.hpp"
 #include "run/simulation.hpp"
+#include "setup/conditions.hpp"
 
 namespace perikit {
 
@@ -87,8 +88,7 @@ void plot_overview(Simulation& simulation, const std::filesystem::path& picture)
   drawn.range = {0.0, static_cast<double>(held)};
   drawn.view = {1, -1, 0.6};
   drawn.value_names = {"body", "in a set", "loaded", "held"};
-  const ParameterValues& integrator = scene.integrator->values;
-  const double end = simulation.quasi_static() || !integrator.has("end_time") ? 1.0 : integrator.number("end_time");
+  const double end = end_of(scene, simulation.quasi_static());
   drawn.arrows = arrows_of(simulation.problem(), end, 0.12 * std::hypot(upper[0] - lower[0], upper[1] - lower[1], upper[2] - lower[2]));
   std::string sides;
   for (const BoundaryDescription& boundary : scene.boundaries)

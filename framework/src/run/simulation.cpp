@@ -11,6 +11,7 @@
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/warnings.hpp"
 #include "run/earlier_results.hpp"
+#include "setup/conditions.hpp"
 #include "setup/problem.hpp"
 #include "warnings/doubts.hpp"
 #include "warnings/small_strains.hpp"
@@ -57,8 +58,7 @@ void Simulation::watch_pieces() {
 }
 
 void Simulation::evaluate_conditions() {
-  const ParameterValues& integrator = scene_.integrator->values;
-  const double end = traits_.quasi_static ? 1.0 : integrator.has("end_time") ? integrator.number("end_time") : 0.0;
+  const double end = end_of(scene_, traits_.quasi_static);
   Field scratch = problem_->make_field();
   for (const double t : {0.0, end}) problem_->loads().evaluate(t, scratch);
   // What is prescribed of displacements in time is asked for from the first step on.

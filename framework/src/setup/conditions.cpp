@@ -15,6 +15,11 @@
 
 namespace perikit {
 
+double end_of(const Scene& scene, bool quasi_static) {
+  const ParameterValues& integrator = scene.integrator->values;
+  return quasi_static ? 1.0 : integrator.has("end_time") ? integrator.number("end_time") : 0.0;
+}
+
 SpaceTimeFunction function_of(const Expression& expression, const RampDescription& ramp, bool quasi_static) {
   const bool ramps = quasi_static && ramp.given.value_or(true) && !expression.depends_on_time();
   return {expression, expression.depends_on_position(), expression.depends_on_time(), ramps};
@@ -50,12 +55,6 @@ void refuse_twice(const Scene& scene, const Body& body, const Images& images, co
                        fmt::format("found the point at ({:.6g}, {:.6g}, {:.6g}) held in {}, and its face by another [[boundary]]; allowed: one of "
                                    "them", x[0], x[1], x[2], "xyz"[prescriptions[k].component]));
     }
-}
-
-/// The time at which a run ends, where its integrator says so; the load parameter's end in quasi-static runs.
-double end_of(const Scene& scene, bool quasi_static) {
-  const ParameterValues& integrator = scene.integrator->values;
-  return quasi_static ? 1.0 : integrator.has("end_time") ? integrator.number("end_time") : 0.0;
 }
 
 /// The time at which two prescriptions do not say the same of a component at x, of the start, half-way and the end.

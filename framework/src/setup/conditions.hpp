@@ -12,6 +12,9 @@
 
 namespace perikit {
 
+/// The time of the last loads and boundaries: the end of the run where its integrator says so, of the load parameter in quasi-static runs; else 0.
+double end_of(const Scene& scene, bool quasi_static);
+
 /// The value of one key. In quasi-static runs it ramps as the scene says, else where it does not mention t.
 SpaceTimeFunction function_of(const Expression& expression, const RampDescription& ramp, bool quasi_static);
 
