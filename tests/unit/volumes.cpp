@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <numbers>
 #include <numeric>
 
@@ -154,6 +155,26 @@ TEST_CASE("partial_volume counts what of a cell lies inside") {
   }
   CHECK(std::abs(last - 0.7625) <= 1e-3);
   CHECK(std::abs(moment - 0.825 * 0.825) <= 1e-3);
+}
+
+TEST_CASE("an oblique surface cuts cells alike wherever it lies: rounding chooses no share and no heir") {
+  const auto cut = [](const std::string& inside) {
+    const Body square = body("[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 1]\ninside = \"" + inside + "\"\n", "partial_volume = true");
+    std::map<int, int> points_with;   // thousandths of a cell -> points
+    for (const std::int32_t p : square.internal()) ++points_with[static_cast<int>(std::lround(square.volume(static_cast<std::size_t>(p)) * 1000 / 0.02))];
+    return points_with;
+  };
+  // Through the corners of cells: half of each is inside.
+  for (const char* inside : {"x + y < 1", "x + y <= 1", "y < 1 - x", "10*x + 10*y < 10"}) {
+    CAPTURE(inside);
+    CHECK(cut(inside) == std::map<int, int>{{500, 10}, {1000, 45}});
+  }
+  for (const char* inside : {"x - y < 0.1", "y - x < 0.1"}) {
+    CAPTURE(inside);
+    CHECK(cut(inside) == std::map<int, int>{{500, 9}, {1000, 55}});
+  }
+  // Through their centres and sides: an eighth goes to the cell below and to that beside, which are equally near.
+  CHECK(cut("x + y < 0.35") == std::map<int, int>{{1000, 4}, {1063, 2}});
 }
 
 TEST_CASE("keys about volumes that would change nothing are refused") {

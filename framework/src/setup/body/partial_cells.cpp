@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
+#include <vector>
 
 #include "setup/body/scene_lattice.hpp"
 #include "setup/body/volumes.hpp"
@@ -31,7 +31,8 @@ class Cells {
     each([&](const Index& k) {
       const PartOfCell& part = own[at(k)];
       if (part.share == 0 || part.share >= least_share) return;
-      if (const auto heir = nearest_point(own, k, part.centroid)) add(parts_[*heir], part);
+      const std::vector<std::size_t> heirs = nearest_points(own, k, part.centroid);
+      for (const std::size_t heir : heirs) add(parts_[heir], {part.share / static_cast<double>(heirs.size()), part.centroid});
     });
     PartialCells points;
     each([&](const Index& k) {
@@ -64,10 +65,13 @@ class Cells {
     return lattice_.position(lattice_.index(inner[0], inner[1], inner[2]));
   }
 
-  /// Of the cells around that have a point, that whose part lies nearest.
-  std::optional<std::size_t> nearest_point(const std::vector<PartOfCell>& own, const Index& k, const Point& x) const {
-    std::optional<std::size_t> nearest;
-    double least = 0;
+  /// Of the cells around that have a point, those whose parts lie nearest: several where rounding would choose among them.
+  std::vector<std::size_t> nearest_points(const std::vector<PartOfCell>& own, const Index& k, const Point& x) const {
+    struct Heir {
+      std::size_t cell;
+      double square;
+    };
+    std::vector<Heir> around;
     const auto ring = [&](int axis) { return axis < dimension_ ? 1 : 0; };
     for (std::int64_t dz = -ring(2); dz <= ring(2); ++dz)
       for (std::int64_t dy = -ring(1); dy <= ring(1); ++dy)
@@ -78,10 +82,12 @@ class Cells {
           if (!there || own[at(j)].share < least_share) continue;
           double square = 0;
           for (std::size_t c = 0; c < 3; ++c) square += (own[at(j)].centroid[c] - x[c]) * (own[at(j)].centroid[c] - x[c]);
-          if (nearest && square >= least) continue;
-          nearest = at(j);
-          least = square;
+          around.push_back({at(j), square});
         }
+    std::vector<std::size_t> nearest;
+    const double tie = 1e-6 * lattice_.spacing * lattice_.spacing;
+    for (const Heir& heir : around)
+      if (std::ranges::all_of(around, [&](const Heir& other) { return heir.square <= other.square + tie; })) nearest.push_back(heir.cell);
     return nearest;
   }
 
