@@ -267,6 +267,11 @@ TEST_CASE("questionable: sets that rounding decides, and sets of one point") {
   silent(left("x < 1.500001"));
   silent(replaced(left("x < 2"), "right = ", "unused = \"x < 1.5\"\nright = "));
   silent(replaced(plate, "left = \"x < 2\"", "left = { nearest = [0, 0] }"));
+  const auto stiff = [](const std::string& condition) {
+    return replaced(plate, "left = ", "stiff = \"" + condition + "\"\nleft = ") + "[[region]]\nset = \"stiff\"\nmaterial = { type = \"linear_elastic\", density = 1, youngs_modulus = 3, poisson_ratio = 0.25 }\n";
+  };
+  warned(stiff("x + y > 7"), "", "the limit of sets.stiff (line 13) passes through points of the lattice");
+  silent(stiff("x > 4 && y > 2"));
 }
 
 TEST_CASE("questionable: horizons below two spacings") {

@@ -58,6 +58,10 @@ bool held(const Scene& scene, const std::string& set) {
 bool loaded(const Scene& scene, const std::string& set) {
   return std::ranges::any_of(scene.loads, [&](const LoadDescription& load) { return load.set == set && load.face.empty(); });
 }
+/// Whether it says what points are made of, or which bonds never fail.
+bool names_a_kind(const Scene& scene, const std::string& set) {
+  return std::ranges::any_of(scene.regions, [&](const RegionDescription& region) { return region.set == set; }) || std::ranges::find(scene.no_fail, set) != scene.no_fail.end();
+}
 
 /// Whether the limit of the condition passes through points, so that rounding chooses among them. On a lattice its planes are met all along.
 bool decided_by_rounding(const Expression& condition, const Body& body) {
@@ -73,7 +77,7 @@ bool decided_by_rounding(const Expression& condition, const Body& body) {
   });
 }
 
-/// Sets of boundaries and loads that hold other points than their author may think. Bodies of more points than this are not looked at for rounding.
+/// Sets of boundaries, loads, regions and no_fail that hold other points than their author may think. Bodies of more points than this are not looked at for rounding.
 constexpr std::size_t most_points = 300000;
 
 /// A set may be the point nearest to a place: in other units, or beyond a hole, the place is somewhere else. Farther than this many spacings it is told.
@@ -97,7 +101,7 @@ void find_far_places(const Scene& scene, const Body& body, std::vector<std::stri
 
 void find_strange_sets(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
   for (const SetDescription& set : scene.sets) {
-    if (!set.expression || (!held(scene, set.name) && !loaded(scene, set.name))) continue;
+    if (!set.expression || !(held(scene, set.name) || loaded(scene, set.name) || names_a_kind(scene, set.name))) continue;
     const std::string place = set.position.line > 0 ? fmt::format(" (line {})", set.position.line) : std::string();
     auto points = static_cast<std::int64_t>(body.set(set.name).size());
     communicator().sum({&points, 1});
