@@ -202,13 +202,25 @@ def in_order(item):
         item["lower"], item["upper"] = min(low, high), max(low, high)
 
 
+def with_places_of_points(scene, X):
+    """Sets of points by their numbers, which are others in a lattice that is turned, as sets of what is near their places."""
+    out = copy.deepcopy(scene)
+    if "lattice" in scene["body"]:
+        near = (0.01 * scene["body"]["lattice"]["spacing"]) ** 2
+        for name, value in out.get("sets", {}).items():
+            if isinstance(value, dict) and "points" in value:
+                squares = [" + ".join("(%s - (%r))^2" % pair for pair in zip(AXES, X[k][:scene["body"]["dimension"]].tolist())) for k in value["points"]]
+                out["sets"][name] = " || ".join("%s < %r" % (square, near) for square in squares)
+    return out
+
+
 def changed_points(text, change, dimension):
     head, *lines = text.strip().split("\n")
     rows = []
     for line in lines:
-        x, y, z, v = (float(word) for word in line.split(","))
+        x, y, z, *volume = (float(word) for word in line.split(","))
         place = change.place([x, y, z][:dimension]) + [0.0] * (3 - dimension)
-        rows.append(",".join(repr(number) for number in place + [change.length ** 3 * v]))
+        rows.append(",".join(repr(number) for number in place + [change.length ** 3 * v for v in volume]))
     return "\n".join([head] + rows) + "\n"
 
 

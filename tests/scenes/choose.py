@@ -2,7 +2,7 @@
 
     choose.py PROGRAM FOLDER seeds.txt
 
-One scene for each pair of kinematics and body, with criteria, integrators and conditions dealt out among them, then scenes for the keys that are left. A scene is
+One scene for each pair of kinematics and body, with regions, criteria, integrators and conditions dealt out among them, then scenes for the keys that are left. A scene is
 taken if `check` and `run` accept it in its own words, it ends well and soon, and it has what it was made for. What no scene could have is printed with what the
 program said."""
 
@@ -13,7 +13,8 @@ import re
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 
-from coverage import BODIES, features, wanted
+from bodies import SHAPES
+from coverage import BODIES, LAWS_THAT_MEET, features, wanted
 from generate import Generator
 from net import repaired
 from tables import read_tables
@@ -28,7 +29,7 @@ def wish_words(wishes):
 
 
 def design(tables):
-    """Wishes of one scene for each pair of kinematics and body: each kinematics meets every criterion, each integrator every condition."""
+    """Wishes of one scene for each pair of kinematics and body: each kinematics meets every shape of regions and every criterion, each integrator every condition."""
     bodies = ["%s %dD" % (kind, d) for kind, d in itertools.product(BODIES, (1, 2, 3)) if not (kind == "voronoi" and d == 1)]
     criteria = list(tables.parts["damage"]) + ["none"]
     statics = [name for name in tables.parts["integrator"] if name != "verlet"]
@@ -39,7 +40,10 @@ def design(tables):
         integrator = statics[number // 2 % len(statics)] if damage == "none" or number % 4 == 0 else "verlet"
         if integrator == "evaluate":
             damage = "none"
-        yield {"kinematics": name, "body": body, "damage": damage, "integrator": integrator, "condition": conditions[number // 3 % 4]}
+        wishes = {"kinematics": name, "body": body, "damage": damage, "integrator": integrator, "condition": conditions[number // 3 % 4]}
+        if (b + k) % 7 < len(SHAPES):
+            wishes |= {"region": SHAPES[(b + k) % 7], "interfaces": LAWS_THAT_MEET[(b + k) // 3 % 2]}
+        yield wishes
 
 
 def purpose(wishes):
@@ -51,8 +55,9 @@ def purpose(wishes):
         out.append("%s, %s" % (wishes["kinematics"], wishes["damage"]))
     if "integrator" in wishes and "condition" in wishes:
         out.append("%s, %s" % (wishes["integrator"], wishes["condition"]))
-    for key in wishes.get("keys", ()):
-        out.append("key " + key)
+    out += ["%s, %s" % (wishes["kinematics"], wishes[what]) for what in ("region", "interfaces") if what in wishes and "kinematics" in wishes]
+    out += ["points " + wishes["points"]] if "points" in wishes else []
+    out += ["key " + key for key in wishes.get("keys", ())]
     return out
 
 
@@ -157,10 +162,15 @@ def wishes_for(feature, tables, turn):
     if len(words) == 2:
         if words[0] in tables.parts["integrator"]:
             return {"integrator": words[0], "condition": words[1], "body": bodies[turn], "damage": "none"}
+        if words[1] in SHAPES + LAWS_THAT_MEET:
+            region = {"region": words[1]} if words[1] in SHAPES else {"region": SHAPES[turn], "interfaces": words[1]}
+            return {"kinematics": words[0], "body": bodies[turn], "damage": "none"} | region
         if words[1] in tables.parts["damage"]:
             return {"kinematics": words[0], "damage": words[1], "body": bodies[turn], "integrator": "verlet"}
         return {"kinematics": words[0], "body": words[1], "integrator": ("verlet", "newton", "evaluate")[turn], "damage": "none"}
     kind, name = feature.split(" ", 1)
+    if kind == "points":
+        return {"points": name, "body": "file 2D"}
     return {kind: name} if kind in tables.parts or kind == "body" else None
 
 

@@ -1,8 +1,12 @@
-"""What scenes cover: parts, keys, and pairs of parts with bodies, criteria and boundaries."""
+"""What scenes cover: parts, keys, and pairs of parts with bodies, regions, criteria and boundaries."""
 
 import itertools
 
+from bodies import SHAPES
+
 BODIES = ("lattice", "jittered", "voronoi", "file")
+FILES = ("csv", "h5")
+LAWS_THAT_MEET = ("laminate", "parallel")
 
 
 def part_name(part):
@@ -34,6 +38,12 @@ def features(scene):
             "influence " + part_name(scene["family"].get("influence", "constant")), "body " + body_of(scene), "%s, %s" % (kinematics, body_of(scene))}
     if isinstance(scene["kinematics"], dict) and "stabilization" in scene["kinematics"]:
         out.add("stabilization " + part_name(scene["kinematics"]["stabilization"]))
+    if "region" in scene:
+        shapes = {region["set"].split("_")[0] for region in scene["region"]}
+        out |= {"%s, %s" % (kinematics, shape) for shape in shapes & set(SHAPES)}
+        out.add("%s, %s" % (kinematics, scene["family"].get("interfaces", "laminate")))
+    if "points" in scene["body"]:
+        out.add("points " + scene["body"]["points"]["file"].split(".")[-1])
     if "damage" in scene:
         out |= {"damage " + part_name(scene["damage"]), "%s, %s" % (kinematics, part_name(scene["damage"]))}
     for condition in ("boundary", "symmetry", "periodic", "load"):
@@ -48,6 +58,8 @@ def wanted(tables):
     out |= {"%s, %s" % pair for pair in itertools.product(tables.parts["kinematics"], bodies)}
     out |= {"%s, %s" % pair for pair in itertools.product(tables.parts["kinematics"], tables.parts["damage"])}
     out |= {"%s, %s" % pair for pair in itertools.product(tables.parts["integrator"], ("boundary", "symmetry", "periodic", "load"))}
+    out |= {"%s, %s" % pair for pair in itertools.product(tables.parts["kinematics"], SHAPES + LAWS_THAT_MEET)}
+    out |= {"points " + kind for kind in FILES} | {"key constants"}
     # Parts stand under sections of their kind.
     out |= {"key %s.%s" % (name, key) for name, table in tables.sections.items() if name not in ("", "sets", "constants") for key in table.keys}
     out |= {"key %s.%s" % (kind, key) for kind in ("kinematics", "material", "damage", "integrator") for table in tables.parts[kind].values()

@@ -12,8 +12,8 @@ import time
 
 import numpy
 
-from change import changed_scene, random_change, reordered
-from generate import STATICS
+from change import changed_scene, random_change, reordered, with_places_of_points
+from conditions import STATICS
 from results import ENVIRONMENT, call, difference, final_values, frames, history, history_difference, read, reference
 from scene_text import write_scene
 
@@ -33,10 +33,11 @@ def kinds_for(scene, several_ranks, larger_bodies):
         kinds += ["ranks 2", "ranks 3", "killed, other ranks"]
     if integrator == "evaluate":
         kinds = [kind for kind in kinds if "killed" not in kind]
-    if "files" in scene:
+    going_on = "from" in scene.get("initial", {})   # of results of the same points in the same order and place
+    if "files" in scene and not going_on:
         kinds.append("order")
     branching = integrator in STATICS and "damage" in scene   # rounding may choose which of several equilibria is found
-    if not (branching or scene["body"].get("lattice", {}).get("jitter") or scene.get("initial", {}).get("from")):
+    if not (branching or scene["body"].get("lattice", {}).get("jitter") or going_on):
         kinds += ["mirrored", "shifted", "units"] + (["turned"] if scene["body"]["dimension"] > 1 else [])
     if integrator in STATICS and not any(section in scene for section in ("damage", "crack")):
         kinds.append("solvers")
@@ -167,7 +168,7 @@ def changed(kind, trial, out, done):
     change = random_change(kind, trial.scene, str(trial.scene))
     if change is None or unstable(out):
         return ""
-    scene = with_steps_of(changed_scene(trial.scene, change, trial.tables), out, change.time)
+    scene = with_steps_of(changed_scene(with_places_of_points(trial.scene, reference(out)["position"]), change, trial.tables), out, change.time)
     other, folder = trial.run(kind, scene=scene)
     if other.status != done.status:
         return "" if planned_anew(out) else status_words(other, done)
@@ -188,9 +189,9 @@ def changed(kind, trial, out, done):
 
 
 def unstable(folder):
-    """Whether the equilibria are no minima of the energy: rounding says where the body goes."""
+    """Whether rounding says where the body goes, whose equilibria are no minima of the energy, or which points a set has."""
     with open(folder + "/run.log") as log:
-        return re.search("warning:.*(stable|positive definite)", log.read()) is not None
+        return re.search("warning:.*(stable|positive definite|rounding decides)", log.read()) is not None
 
 
 def pairing(X, Y):

@@ -2,6 +2,8 @@
 
 import os
 
+from results import h5py
+
 SUB_SECTIONS = {"body": ("lattice", "points")}
 
 
@@ -47,11 +49,22 @@ def is_tables(value):
     return isinstance(value, list) and len(value) > 0 and isinstance(value[0], dict)
 
 
+def write_columns(text, path):
+    """The columns of a .csv file as datasets of an .h5 file."""
+    names, *rows = [line.split(",") for line in text.strip().split("\n")]
+    with h5py.File(path, "w") as file:
+        for name, column in zip(names, zip(*rows)):
+            file[name] = [float(word) for word in column]
+
+
 def write_scene(scene, folder):
     os.makedirs(folder, exist_ok=True)
     for name, text in scene.get("files", {}).items():
         with open(os.path.join(folder, name), "w") as file:
             file.write(text)
+    columns = scene["body"].get("points", {}).get("file", "")
+    if columns.endswith(".h5"):
+        write_columns(scene["files"][columns.replace(".h5", ".csv")], os.path.join(folder, columns))
     path = os.path.join(folder, "scene.toml")
     with open(path, "w") as file:
         file.write(scene_text(scene))

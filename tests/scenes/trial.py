@@ -7,7 +7,6 @@ import shutil
 
 import numpy
 
-from generate import STATICS
 from other_runs import kinds_for, try_other
 from results import call, difference, frames, history, read, reference
 from scene_text import scene_text, write_scene
@@ -25,7 +24,7 @@ def make_earlier_results(program, scene, folder):
     lattice = scene["body"].get("lattice")
     size = max(high - low for low, high in zip(lattice["lower"], lattice["upper"])) if lattice else 1.0
     waves = ["%r*sin(%r*x)" % (0.003 * size, 3 / size)] + [0.0] * (d - 1)
-    kept = ("format", "body", "sets", "family", "kinematics", "material", "region", "files")
+    kept = ("format", "constants", "body", "sets", "family", "kinematics", "material", "region", "files")
     earlier = {key: value for key, value in scene.items() if key in kept} | {"initial": {"displacement": waves}, "integrator": {"type": "evaluate"}}
     path = write_scene(earlier, os.path.join(folder, "earlier_scene"))
     call([program, "run", path, "-o", os.path.join(folder, os.path.dirname(name)), "--quiet"])
