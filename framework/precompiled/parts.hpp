@@ -32,5 +32,9 @@
 #include <variant>
 #include <vector>
 
+#include "perikit/damage.hpp"
+#include "perikit/influence.hpp"
+#include "perikit/integrator.hpp"
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/law_material.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/stabilization.hpp"

@@ -1,6 +1,6 @@
 #include "../shared/bond_jacobian.hpp"
 #include "jfnk.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/integrator.hpp"
 
 PERIKIT_PLUGIN(registrar) {
   using namespace perikit;

@@ -1,5 +1,5 @@
 #include "newton.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/integrator.hpp"
 
 PERIKIT_PLUGIN(registrar) {
   using namespace perikit;

@@ -1,5 +1,5 @@
 #pragma once
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/integrator.hpp"
 
 namespace perikit {
 

@@ -1,4 +1,4 @@
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/material.hpp"
 
 #include <memory>
 

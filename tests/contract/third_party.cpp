@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "perikit/core/tensor.hpp"
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/law_material.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 

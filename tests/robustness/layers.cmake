@@ -40,6 +40,11 @@ endif()
 
 # The place of "folder/.../file.hpp" in the order.
 function(place_of path variable)
+  if(NOT path MATCHES "/")   # perikit/<kind>.hpp: what a part of that kind includes
+    list(FIND order sdk place)
+    set(${variable} ${place} PARENT_SCOPE)
+    return()
+  endif()
   string(REGEX MATCH "^[^/]+" folder ${path})
   string(REGEX REPLACE "\\.[a-z]+$" "" stem ${path})
   list(FIND order ${stem} place)

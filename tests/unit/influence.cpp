@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "perikit/core/errors.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 #include "plugin/registry.hpp"
 #include "scene/scene.hpp"
 

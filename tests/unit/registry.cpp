@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "perikit/core/errors.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 #include "plugin/manifest.hpp"
 
 using namespace perikit;

@@ -12,8 +12,13 @@
 #include <sstream>
 
 #include "model/kinematics_class.hpp"
+#include "perikit/damage.hpp"
+#include "perikit/influence.hpp"
+#include "perikit/integrator.hpp"
+#include "perikit/kinematics.hpp"
+#include "perikit/material.hpp"
 #include "perikit/plugin/abi.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/stabilization.hpp"
 #include "plugin/library.hpp"
 #include "plugin/manifest.hpp"
 #include "plugin/registrar.hpp"

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <memory>
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 using namespace perikit;
 

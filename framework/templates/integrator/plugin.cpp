@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/integrator.hpp"
 #include "perikit/sdk/stable_step.hpp"
 
 using namespace perikit;

@@ -1,4 +1,4 @@
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/damage.hpp"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <string>
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 using namespace perikit;
 

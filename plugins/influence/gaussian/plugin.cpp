@@ -2,7 +2,7 @@
 #include <cmath>
 #include <memory>
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 using namespace perikit;
 

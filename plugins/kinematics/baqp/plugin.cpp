@@ -1,4 +1,4 @@
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/projected_bond.hpp"
 
 using namespace perikit;

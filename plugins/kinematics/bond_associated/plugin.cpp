@@ -1,8 +1,8 @@
 #include <memory>
 
 #include "perikit/core/simd.hpp"
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/kinematics_options.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 

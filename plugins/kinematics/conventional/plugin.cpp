@@ -1,7 +1,7 @@
 #include <memory>
 
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/kinematics_options.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 

@@ -1,9 +1,10 @@
 #include <cmath>
 #include <memory>
 
+#include "perikit/core/field.hpp"
 #include "perikit/core/simd_math.hpp"
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/kinematics_options.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 using namespace perikit;
 

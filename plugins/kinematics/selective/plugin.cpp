@@ -1,5 +1,5 @@
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/kinematics_options.hpp"
-#include "perikit/sdk/plugin.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/stabilization.hpp"
 
 using namespace perikit;
 

@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/kinematics.hpp"
 #include "perikit/sdk/projected_bond.hpp"
 
 using namespace perikit;

@@ -1,6 +1,6 @@
 /// An integrator that throws on one rank, somewhere in a run: the others are then waiting for it.
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/integrator.hpp"
 
 #include <sys/resource.h>
 

@@ -1,4 +1,4 @@
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 PERIKIT_PLUGIN(registrar) {
   registrar.influence({.name = "CamelCase", .summary = "a name that is not snake_case", .examples = {""}},

@@ -1,4 +1,4 @@
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 PERIKIT_PLUGIN(registrar) {
   registrar.influence({.name = "unreadable", .summary = "an example that is no TOML", .examples = {"", "order = = 1"}},

@@ -1,4 +1,4 @@
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 using namespace perikit;
 

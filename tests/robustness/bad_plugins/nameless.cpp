@@ -1,4 +1,4 @@
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 PERIKIT_PLUGIN(registrar) {
   registrar.influence({.summary = "a part without a name", .examples = {""}},

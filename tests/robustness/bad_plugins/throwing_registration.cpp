@@ -1,6 +1,6 @@
 #include <stdexcept>
 
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/influence.hpp"
 
 using namespace perikit;
 

@@ -2,7 +2,7 @@
 #include <memory>
 
 #include "perikit/core/simd.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/kinematics.hpp"
 
 using namespace perikit;
 
