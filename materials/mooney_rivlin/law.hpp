@@ -1,12 +1,9 @@
 #pragma once
 
 #include <array>
-#include <cmath>
-#include <stdexcept>
-#include <string>
 
 #include "perikit/core/tensor.hpp"
-#include "perikit/model/material.hpp"
+#include "perikit/model/elastic_constants.hpp"
 #include "perikit/sdk/rubber_free_stress.hpp"
 #include "perikit/sdk/rubber_invariants.hpp"
 #include "perikit/sdk/volumetric.hpp"
@@ -26,11 +23,8 @@ struct MooneyRivlin {
     k[0] = input.value("C1");
     k[1] = input.value("C2");
     k[2] = input.value("bulk_modulus");
-    if (!(k[0] + k[1] > 0) || !std::isfinite(k[0] + k[1]))
-      throw std::domain_error("found C1 + C2 = " + std::to_string(k[0] + k[1]) +
-                              "; allowed: a finite value > 0 (half the shear modulus)");
-    if (!(k[2] > 0) || !std::isfinite(k[2]))
-      throw std::domain_error("found bulk_modulus = " + std::to_string(k[2]) + "; allowed: a finite value > 0");
+    require_positive("C1 + C2", k[0] + k[1], "half the shear modulus");
+    require_positive("bulk_modulus", k[2]);
   }
   Moduli small_strain(const double* k) const noexcept {
     const double mu = 2 * (k[0] + k[1]);

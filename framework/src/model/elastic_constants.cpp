@@ -99,4 +99,9 @@ Moduli elastic_constants(const MaterialInput& input) {
   return m;
 }
 
+void require_positive(std::string_view name, double value, std::string_view meaning) {
+  if (value > 0 && std::isfinite(value)) return;
+  refuse(name, value, meaning.empty() ? "a finite value > 0" : fmt::format("a finite value > 0 ({})", meaning));
+}
+
 }  // namespace perikit

@@ -99,7 +99,7 @@ struct Tensor {
   template <class F>
   static Tensor map(F&& f) noexcept {
     return [&]<std::size_t... k>(std::index_sequence<k...>) {
-      return Tensor{{f(int(k))...}};
+      return Tensor{{static_cast<T>(f(int(k)))...}};
     }
     (std::make_index_sequence<size>{});
   }

@@ -10,4 +10,7 @@ namespace perikit {
 /// poisson_ratio outside (-1, 1/2), not finite.
 Moduli elastic_constants(const MaterialInput& input);
 
+/// Throws std::domain_error with the name and the meaning of a constant that is not positive and finite.
+void require_positive(std::string_view name, double value, std::string_view meaning = {});
+
 }  // namespace perikit
