@@ -15,6 +15,8 @@
 
 namespace perikit {
 
+class BondCopies;
+
 /// Bonds between two sides of a body that have limits of their own.
 struct InterfaceDamage {
   std::array<std::uint16_t, 2> sides{};
@@ -32,6 +34,8 @@ struct BodyDamage {
   /// By point, from the nearest interface of two materials, where bonds across it are springs in series [m]; infinite elsewhere. Empty where limits
   /// are no stretches, or there is one region.
   Field distance;
+  /// Of a body with images, where the criterion asks for more than stretches; else null.
+  std::shared_ptr<const BondCopies> copies;
   bool second_law = false;  ///< bonds whose failure would raise the stored energy stay as they are
 
   const Field& last() const noexcept { return failure.size() > 0 ? failure : onset; }

@@ -72,7 +72,7 @@ bool has_all_sides(const Body& body, const FamilyArrays& family) {
 
 }  // namespace
 
-CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation, const Partition* partition) {
+CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation, const Partition* partition, const ImageMap* images) {
   const Body& body = families.body();
   const int d = body.dimension();
   AlignedVector<double> share;
@@ -86,6 +86,7 @@ CrossingBonds crossing_bonds(const Families& families, const Formulation& formul
       all_sides.data()[p] = has_all_sides(body, family) ? 1 : 0;
     }
     if (partition) Ghosts(*partition, 1).forward(all_sides);
+    if (images) images->copy_from_sources(all_sides);
     // No surface cuts the family of a point of whose neighbours each has points on all sides; thin bodies have no such point.
     std::vector<OfPoint> whole, others;
     for (const std::int32_t p : body.owned()) {

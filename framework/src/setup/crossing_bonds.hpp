@@ -4,6 +4,7 @@
 #include "body/partition/partition.hpp"
 #include "families/families.hpp"
 #include "model/formulation.hpp"
+#include "perikit/problem/image_map.hpp"
 
 namespace perikit {
 
@@ -16,7 +17,7 @@ struct CrossingBonds {
 
 /// On a lattice without jitter, for a plane along the lattice: the weakest. Else the mean over all planes and over the points with whole families, which
 /// no surface cuts; in thin bodies over those with points on all sides; of a lattice of the same spacing where there is no such point. partition: null
-/// where one rank has the whole body. All ranks must call it.
-CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation, const Partition* partition = nullptr);
+/// where one rank has the whole body; images: null where the body has none. All ranks must call it.
+CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation, const Partition* partition = nullptr, const ImageMap* images = nullptr);
 
 }  // namespace perikit

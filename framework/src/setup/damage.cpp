@@ -11,6 +11,7 @@
 
 #include "body/interfaces.hpp"
 #include "families/families.hpp"
+#include "families/fracture/bond_copies.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/warnings.hpp"
 #include "problem/ghosts.hpp"
@@ -43,7 +44,7 @@ double rayleigh_speed(const Moduli& moduli, double density) {
   return density > 0 ? std::sqrt(moduli.mu / density) * (0.862 + 1.14 * nu) / (1 + nu) : 0.0;
 }
 
-void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits, bool images) {
+void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
     throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
   };
@@ -51,9 +52,6 @@ void refuse_unsuited(const Scene& scene, const Formulation& formulation, const D
   if (traits.stress && formulation.pairs)
     refuse(fmt::format("{} with kinematics \"{}\", whose bonds have no stress", criterion, scene.kinematics->type),
            "kinematics with gradients, or criteria by stretch or energy");
-  if ((traits.stress || traits.energy) && images)
-    refuse(fmt::format("{} in a body with held faces, symmetry or periodic sides, whose images store no energy", criterion),
-           "criteria by stretch, or layers of points");
   if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
 }
 
@@ -108,8 +106,7 @@ Field distances_from_interfaces(const Body& body, const Interfaces* interfaces) 
 }
 
 /// Limits of the bonds between regions by the numbers of the interface, with the material of either side: the least of that side.
-void build_interfaces(const Scene& scene, const PartFactory& factory, const TermParts& parts, DamagePoint at,
-                      const ImageMap* images, BodyDamage& damage) {
+void build_interfaces(const Scene& scene, const PartFactory& factory, const TermParts& parts, DamagePoint at, BodyDamage& damage) {
   const Body& body = parts.families->body();
   const InterfaceDescription& first = scene.interfaces.front();
   const auto refuse = [](const InterfaceDescription& interface, const std::string& message) {
@@ -119,7 +116,6 @@ void build_interfaces(const Scene& scene, const PartFactory& factory, const Term
   if (!of_body.bits && !of_body.by_limits)
     refuse(first, fmt::format("found with \"{}\", whose bonds weaken by more numbers than two limits; allowed: criteria that break bonds at "
                               "once, or weaken them between their limits alone", scene.damage->type));
-  if (images) refuse(first, "found in a body with held faces, symmetry or periodic sides; allowed: bodies without");
   for (const InterfaceDescription& interface : scene.interfaces) {
     InterfaceDamage own{{side_of(scene, interface.between[0]), side_of(scene, interface.between[1])}, {{{infinite, infinite}, {infinite, infinite}}}};
     const auto law = factory.damage(*interface.damage);
@@ -191,7 +187,7 @@ void warn_of_interface_stresses(const Scene& scene, const Families& families, co
 }  // namespace
 
 std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFactory& factory, const TermParts& parts,
-                                               const ImageMap* images, const Partition* partition, bool quasi_static,
+                                               const ImageMap* images, const Images& made, const Partition* partition, bool quasi_static,
                                                std::vector<std::string>& warnings) {
   if (!scene.damage) return nullptr;
   auto damage = std::make_unique<BodyDamage>();
@@ -199,7 +195,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   const bool gradually = gradual(scene, *damage->law, quasi_static);
   const ParameterValues& values = scene.damage->values;
   damage->second_law = values.boolean("second_law");   // the scene reader knows the default
-  refuse_unsuited(scene, parts.formulation, damage->law->traits(), images != nullptr);
+  refuse_unsuited(scene, parts.formulation, damage->law->traits());
   const Body& body = parts.families->body();
   const Laws& laws = *parts.laws;
   damage->onset = body.make_field(1);
@@ -214,7 +210,8 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
     for (const InterfaceDescription& interface : scene.interfaces) warn_of_short_zone(body.frame(), interface.damage->values, length, warnings);
   }
   if (!damage->by_stretch()) {
-    const CrossingBonds crossing = crossing_bonds(*parts.families, parts.formulation, partition);
+    if (images) damage->copies = std::make_shared<const BondCopies>(*parts.families, made);
+    const CrossingBonds crossing = crossing_bonds(*parts.families, parts.formulation, partition, images);
     at.crossing = crossing.plain;
     at.crossing_shares = crossing.shares;
   }
@@ -238,7 +235,7 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
   }
   if (!scene.interfaces.empty() || (damage->by_stretch() && !scene.regions.empty())) damage->side = find_sides(scene, body, images, partition);
   if (damage->by_stretch() && !damage->side.empty()) damage->distance = distances_from_interfaces(body, parts.interfaces.get());
-  if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, images, *damage);
+  if (!scene.interfaces.empty()) build_interfaces(scene, factory, parts, at, *damage);
   for (const std::string& set : scene.no_fail)
     for (const std::int32_t p : body.set(set)) damage->onset.data()[p] = damage->failure.data()[p] = infinite;
   const std::array limits_of_points{&damage->onset, &damage->failure, &damage->crack_speed};

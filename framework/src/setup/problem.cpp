@@ -230,7 +230,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;
   if (scene.damage) steps.begin("limits of bonds");
-  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), partition, quasi_static, warnings));
+  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), beyond.images, partition, quasi_static, warnings));
   of_terms.damage = parts.fracture.damage();
   steps.begin("weights");
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);

@@ -29,6 +29,7 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
       body_(parts.families.body()),
       formulation_(parts.formulation),
       damage_(damage),
+      copies_(damage ? damage->copies.get() : nullptr),
       terms_(terms),
       skip_(skip),
       traits_(asked),
@@ -38,7 +39,7 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
   const std::size_t count = body_.stride() / padding;
   for (std::size_t g = 0; g < count; ++g) {
     bool any = false;
-    for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l) && body_.owns(g * padding + l);
+    for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l) && (body_.owns(g * padding + l) || (copies_ && copies_->image(static_cast<std::int32_t>(g * padding + l))));
     if (any) groups_.push_back(static_cast<std::int32_t>(g));
   }
   own_.assign(count, 0);
@@ -58,11 +59,13 @@ void BondCriterion::set_screen(std::span<const double> factors) {
   screen_.limit = infinite;
   for (const std::int32_t p : body_.internal()) screen_.limit = std::min(screen_.limit, onset.data()[p]);
   for (const InterfaceDamage& i : damage_->interfaces) screen_.limit = std::min(screen_.limit, i.least());
+  // A bond to an image stores half of what it holds.
+  if (copies_ && formulation_.pairs) screen_.limit *= 0.5;
   screen_.over_share = traits_.bound == ValueBound::energy_over_share;
   screen_.near.assign(body_.stride() / padding, 0);
   screen_.density.assign(body_.stride(), infinite);
   if (formulation_.pairs) {
-    for (const std::int32_t p : body_.owned())
+    for (const std::int32_t p : copies_ ? body_.internal() : std::span(body_.owned()))   // a bond may be met at its end that is an image
       if (onset.data()[p] < infinite) screen_.density[static_cast<std::size_t>(p)] = 0;
     return;
   }
@@ -141,6 +144,11 @@ void BondCriterion::name_near_failure() {
     families_.load(static_cast<std::size_t>(p), BondsOf::intact, family);
     for (const std::int32_t far : family.far) named_.push_back(BondId::of(p, far));
   }
+  if (copies_) {
+    keep_each_once(named_);
+    copies_->add_copies(named_);
+    return;
+  }
   std::erase_if(named_, [&](BondId b) { return !body_.owns(static_cast<std::size_t>(b.point)); });   // their owners look at them
   keep_each_once(named_);
 }
@@ -172,7 +180,11 @@ GroupMarks BondCriterion::near_failure(const Configuration& at) {
 
 void BondCriterion::look_at_named() {
   looked_at_.assign(own_.size(), 0);
-  for (const BondId bond : named_) mark(looked_at_, static_cast<std::size_t>(bond.point));
+  for (const BondId bond : named_) {
+    mark(looked_at_, static_cast<std::size_t>(bond.point));
+    // Pair laws say what bonds of marked points hold, and a copy has the first end of another one there.
+    if (copies_ && formulation_.pairs) mark(looked_at_, static_cast<std::size_t>(bond.far));
+  }
 }
 
 std::vector<std::int32_t> BondCriterion::groups_with(const GroupMarks& marks) const {
@@ -193,27 +205,35 @@ GroupMarks BondCriterion::looked_at(std::span<const std::int32_t> groups) const 
 void BondCriterion::sample(std::span<const std::int32_t> groups, const Configuration& at) {
   if (groups.empty()) return;
   own_ = looked_at(groups);
+  sampled_ = own_;
+  if (copies_) {
+    copies_->add_copies(sampled_);
+    sampled_ = families_.evaluated(std::move(sampled_));
+  }
   if (flux_.flux.data) {
     samples_.ask(BondSampling::energy);
     return collect(at, own_, own_);
   }
-  if (formulation_.pairs) return collect(at, own_, own_);  // both ends at once
+  if (formulation_.pairs) return collect(at, sampled_, sampled_);  // both ends at once
   if (named_.empty()) {
-    near_ = families_.around(own_);
+    near_ = families_.around(sampled_);
   } else {
+    const auto of_groups = named_in(groups.front(), groups.back());
+    std::vector<BondId> bonds(of_groups.begin(), of_groups.end());
+    if (copies_) copies_->add_copies(bonds);
     std::vector<std::int32_t> ends;
-    for (const BondId bond : named_in(groups.front(), groups.back())) ends.insert(ends.end(), {bond.point, bond.far});
+    for (const BondId bond : bonds) ends.insert(ends.end(), {bond.point, bond.far});
     near_ = families_.marks_of(ends);
   }
-  if (!release_) return collect(at, near_, own_);
+  if (!release_) return collect(at, near_, sampled_);
   samples_.ask(BondSampling::derivative);
   const GroupMarks owners = release_->reach() > 1 ? families_.around(near_) : near_;
   collect(at, owners, near_);
-  release_->find(at.u(), near_, owners, {own_, named_}, samples_);
+  release_->find(at.u(), near_, owners, {sampled_, named_}, samples_);
 }
 
 void BondCriterion::find_flux(std::span<const std::int32_t> groups, const Configuration& at) {
-  if (!release_ || !release_->follows_from_flux() || groups.empty()) return;
+  if (!release_ || copies_ || !release_->follows_from_flux() || groups.empty()) return;
   const ConstFieldView u = at.u();
   BreakableTerm& bonds = *terms_.front()->breakable();
   if (known_at(u)) flux_ = bonds.point_flux();
@@ -254,9 +274,12 @@ double BondCriterion::energy_of(std::int32_t p, std::int32_t far, double b, doub
   const double volumes = body_.volume(static_cast<std::size_t>(p)) * body_.volume(static_cast<std::size_t>(far));
   double energy = 0;
   for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) {
-    if (!by_point_)
-      if (const BondSamples::Entry* of_bond = samples_.find(owner, other)) energy += of_bond->energy / (b * volumes);
-    if (samples_.both_ways()) return energy;
+    const BondSamples::Entry* const of_bond = by_point_ ? nullptr : samples_.find(owner, other);
+    if (of_bond) energy += of_bond->energy / (b * volumes);
+    if (samples_.both_ways()) {
+      if (of_bond) return energy;
+      continue;   // of a copy the other end may be the one that was asked for
+    }
     if (samples_.of_bonds_alone()) continue;
     const BondSamples::Entry* of_point = samples_.find(owner, -1);
     const auto i = static_cast<std::size_t>(owner);
@@ -264,6 +287,64 @@ double BondCriterion::energy_of(std::int32_t p, std::int32_t far, double b, doub
     if (of_point && left > 0) energy += of_point->energy * whole_omega / (left * body_.volume(i));
   }
   return energy;
+}
+
+void BondCriterion::add_stress(std::int32_t owner, std::int32_t far, std::int32_t turned_by, double& weight, double* stress) const noexcept {
+  const BondSamples::Entry* entry = samples_.find(owner, by_point_ ? -1 : far);
+  if (!entry || entry->weight <= 0) return;
+  // Of points the mean, of bonds the mean by weight.
+  const double factor = by_point_ ? 1 / entry->weight : 1.0;
+  double turned[6];
+  std::copy_n(entry->tensor, 6, turned);
+  if (copies_) copies_->turn_stress(turned_by, turned);
+  weight += factor * entry->weight;
+  for (std::size_t c = 0; c < 6; ++c) stress[c] += factor * turned[c];
+}
+
+bool BondCriterion::stands_for_copies(std::int32_t p, std::int32_t far, Bonds& m) const {
+  copies_->find(p, far, m.copies);
+  return BondCopies::first(m.copies).bond() == BondId::of(p, far) && copies_->decides(m.copies);
+}
+
+double BondCriterion::energy_of_copy(const BondCopies::Copy& copy, double b, Bonds& m) const {
+  if (release_) return release_->of(copy.point, copy.far) + release_->of(copy.far, copy.point);
+  double omega = 0;   // behind curved surfaces copies have other lengths
+  if (by_point_) {
+    families_.load(static_cast<std::size_t>(copy.point), BondsOf::intact, m.of_copy);
+    const auto at = std::ranges::lower_bound(m.of_copy.far, copy.far);
+    omega = m.of_copy.whole_omega(static_cast<std::size_t>(at - m.of_copy.far.begin()));
+  }
+  return energy_of(copy.point, copy.far, b, omega) * body_.volume(static_cast<std::size_t>(copy.point)) * body_.volume(static_cast<std::size_t>(copy.far));
+}
+
+/// The body stores the energies of evaluation points that belong to points of its own. Both directions of a bond, which has two, are found among
+/// its copies: the one between p and the image of q has one of them, that between q and the image of p the other. A bond between a point and its own
+/// image is the only one of its copies, and has one.
+void BondCriterion::take_copies(std::int32_t p, std::size_t k, ConstFieldView u, Bonds& m) const {
+  std::int32_t here = p, far = m.family.far[m.place[k]];
+  if (copies_->image(here)) std::swap(here, far);
+  copies_->find(here, far, m.copies);
+  const int most_ends = BondCopies::first(m.copies).real_ends;
+  if (m.copies.size() == 1 && most_ends == 2) return;
+  const double b = m.family.b(m.place[k]);
+  double energy = 0, volumes = 0, weight = 0, stress[6] = {};
+  double stretch = -1;
+  for (const BondCopies::Copy& copy : m.copies) {
+    if (families_.integrity(copy.bond()) == 0) continue;
+    if (traits_.energy) energy += energy_of_copy(copy, b, m);
+    volumes += copy.real_ends * body_.volume(static_cast<std::size_t>(copy.point)) * body_.volume(static_cast<std::size_t>(copy.far));
+    if (copy.real_ends < most_ends) continue;
+    // Behind a held face one of two copies may be shorter than at rest.
+    stretch = std::max(stretch, bond_stretch(body_, u, copy.bond()));
+    for (const auto& [owner, other] : {std::pair(copy.point, copy.far), std::pair(copy.far, copy.point)})
+      if (traits_.stress && !copies_->image(owner)) add_stress(owner, other, copy.point, weight, stress);
+    // The other direction of a bond between a point and its own image is the mirror of the one that is there.
+    if (traits_.stress && m.copies.size() == 1) add_stress(copy.point, copy.far, copy.far, weight, stress);
+  }
+  m.stretch[k] = stretch;
+  if (traits_.energy) m.energy[k] = 2 * energy / volumes;
+  const std::size_t size = m.stretch.size();
+  for (std::size_t c = 0; c < 6 && traits_.stress; ++c) m.stress[c * size + k] = weight > 0 ? stress[c] / weight : 0.0;
 }
 
 void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const BondId> named, Bonds& m) const {
@@ -274,7 +355,7 @@ void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const BondI
     // A bond is looked at once: at its lower end, or at the one whose group is looked at.
     const bool here = named.empty() ? p < far || !looks_at(static_cast<std::size_t>(far))
                                     : std::ranges::binary_search(named, BondId{p, far});
-    if (here) m.place.push_back(k);
+    if (here && (!copies_ || stands_for_copies(p, far, m))) m.place.push_back(k);
   }
   const std::size_t n = m.place.size(), size = padded(n);
   for (auto* array : {&m.length, &m.stretch, &m.share, &m.energy, &m.value, &m.onset, &m.failure, &m.integrity})
@@ -296,16 +377,10 @@ void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const BondI
       m.energy[k] = energy_of(p, far, m.family.b(m.place[k]), m.family.whole_omega(m.place[k]));
     if (traits_.stress) {
       double weight = 0, stress[6] = {};
-      for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) {
-        const BondSamples::Entry* entry = samples_.find(owner, by_point_ ? -1 : other);
-        if (!entry || entry->weight <= 0) continue;
-        // Of points the mean, of bonds the mean by weight.
-        const double factor = by_point_ ? 1 / entry->weight : 1.0;
-        weight += factor * entry->weight;
-        for (std::size_t c = 0; c < 6; ++c) stress[c] += factor * entry->tensor[c];
-      }
+      for (const auto& [owner, other] : {std::pair(p, far), std::pair(far, p)}) add_stress(owner, other, p, weight, stress);
       for (std::size_t c = 0; c < 6 && weight > 0; ++c) m.stress[c * size + k] = stress[c] / weight;
     }
+    if (copies_) take_copies(p, k, u, m);
   }
   if (!damage_) return;
   for (std::size_t k = 0; k < n; ++k) {
@@ -345,6 +420,7 @@ std::vector<BondChange> BondCriterion::find(const Configuration& at) {
     look_at_named();
   } else {
     looked_at_ = skip_ || release_ ? near_failure(at) : GroupMarks(own_.size(), whole_group);
+    if (copies_) copies_->add_copies(looked_at_);
   }
   const std::vector<std::int32_t> near = groups_with(looked_at_);
   find_flux(near, at);
@@ -365,8 +441,22 @@ std::vector<BondChange> BondCriterion::find(const Configuration& at) {
   // Where a bond lies in two pieces it was found in both.
   const auto bond = [](const Found& f) { return f.change.bond; };
   keep_each_once(found_, bond);
+  if (copies_) find_copies();
   for (const Found& f : found_) all.push_back(f.change);
   return all;
+}
+
+/// Copies of bonds that were found have the same value, and fail with them.
+void BondCriterion::find_copies() {
+  std::vector<Found> all;
+  std::vector<BondCopies::Copy> copies;
+  for (const Found& f : found_) {
+    copies_->find(f.change.bond.point, f.change.bond.far, copies);
+    for (const BondCopies::Copy& copy : copies)
+      if (families_.integrity(copy.bond()) > f.change.integrity) all.push_back({{copy.bond(), f.change.integrity}, f.value});
+  }
+  keep_each_once(all, [](const Found& f) { return f.change.bond; });
+  found_ = std::move(all);
 }
 
 void BondCriterion::values(std::span<const BondId> bonds, const Configuration& at, std::span<double> values) {
@@ -381,17 +471,25 @@ void BondCriterion::values(std::span<const BondId> bonds, const Configuration& a
     return;
   }
   while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Bonds>());
+  std::vector<BondId> first(bonds.begin(), bonds.end());  // of their copies
+  std::vector<BondCopies::Copy> copies;
+  for (BondId& bond : first) {
+    if (!copies_) break;
+    copies_->find(bond.point, bond.far, copies);
+    bond = BondCopies::first(copies).bond();
+  }
   std::vector<std::int32_t> groups;
-  for (const BondId bond : bonds) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
+  for (const BondId bond : first) groups.push_back(bond.point / static_cast<std::int32_t>(padding));
   keep_each_once(groups);
-  named_.assign(bonds.begin(), bonds.end());
-  std::ranges::sort(named_);
+  named_ = first;
+  if (copies_) copies_->add_copies(named_);
+  else std::ranges::sort(named_);
   look_at_named();
   find_flux(groups, at);
   sample(groups, at);
   Bonds& m = *memory_[0];
   for (std::size_t k = 0; k < bonds.size(); ++k) {
-    load(bonds[k].point, u, {&bonds[k], 1}, m);
+    load(first[k].point, u, {&first[k], 1}, m);
     values[k] = m.place.empty() ? 0.0 : m.value[0];
   }
   flux_ = {};

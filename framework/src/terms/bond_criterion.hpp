@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "families/families.hpp"
+#include "families/fracture/bond_copies.hpp"
 #include "families/fracture/bond_finder.hpp"
 #include "model/formulation.hpp"
 #include "operators/bond_samples.hpp"
@@ -50,6 +51,8 @@ class BondCriterion final : public BondFinder {
     std::vector<std::size_t> place;  ///< in the family
     AlignedVector<double> length, stretch, share, energy, stress, value, onset, failure, integrity;
     AlignedVector<double> all_shares;
+    std::vector<BondCopies::Copy> copies;
+    FamilyArrays of_copy;
   };
 
   void set_screen(std::span<const double> factors);
@@ -80,11 +83,19 @@ class BondCriterion final : public BondFinder {
   /// The bonds of p with their states and values; `named`: these alone.
   void load(std::int32_t p, ConstFieldView u, std::span<const BondId> named, Bonds& bonds) const;
   double energy_of(std::int32_t p, std::int32_t far, double b, double whole_omega) const noexcept;
+  /// What the bond holds or sets free [J], by the terms; a copy of one with the integrity b.
+  double energy_of_copy(const BondCopies::Copy& copy, double b, Bonds& bonds) const;
+  void add_stress(std::int32_t owner, std::int32_t far, std::int32_t turned_by, double& weight, double* stress) const noexcept;
+  /// Of a body with images: bond k of p stands for its copies, and what it holds is what all of them do.
+  void take_copies(std::int32_t p, std::size_t k, ConstFieldView u, Bonds& bonds) const;
+  /// Whether this rank looks at the bond for all of its copies.
+  bool stands_for_copies(std::int32_t p, std::int32_t far, Bonds& bonds) const;
 
   const Families& families_;
   const Body& body_;
   const Formulation& formulation_;
   const BodyDamage* damage_;
+  const BondCopies* copies_;  ///< null: the body has no images
   TermsOf terms_;
   bool skip_;
   bool marked_by_forces_ = false;
@@ -97,6 +108,7 @@ class BondCriterion final : public BondFinder {
   std::vector<std::int32_t> groups_;  ///< with live points of this rank
   GroupMarks looked_at_;              ///< the points whose bonds are looked at
   std::vector<BondId> named_;         ///< ascending: of the bonds of these points those that are; empty: all
+  GroupMarks sampled_;                ///< own_, and the copies of these points
   GroupMarks own_, near_;             ///< what was sampled last: points, and those at the far ends of bonds that are looked at
   std::vector<std::unique_ptr<Bonds>> memory_;  ///< by thread
   BondScreen screen_;
@@ -105,6 +117,7 @@ class BondCriterion final : public BondFinder {
     BondChange change;
     double value;
   };
+  void find_copies();
   std::vector<Found> found_;          ///< by the last `find`, ascending
   const double* found_at_ = nullptr;  ///< its displacement
 };

@@ -113,7 +113,7 @@ struct BondRelease::Memory {
 BondRelease::BondRelease(const ReleaseParts& parts)
     : parts_(parts),
       one_state_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(parts.laws)),
-      mirrored_(one_state_ && parts.factors.empty()),
+      mirrored_(one_state_ && parts.factors.empty() && !parts.images),
       through_point_gradient_(!parts.formulation.weighted || parts.formulation.selective()) {}
 BondRelease::~BondRelease() = default;
 

@@ -31,6 +31,7 @@ struct ReleaseParts {
   const Stabilization* stabilization;  ///< may be null
   ConstFieldView shift;                ///< of point gradients (spaces/cloud_gradient.hpp); without data: none
   std::span<const double> factors;     ///< of the weights of evaluation points (EvaluationSpace::set_factors); empty: 1
+  bool images = false;                 ///< images store nothing, so that one direction of a bond does not stand for both
 };
 
 /// Bonds of which it is asked what they set free: those that are named, ascending; or all with an end in `ends`.

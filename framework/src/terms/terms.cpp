@@ -33,7 +33,8 @@ ReleaseParts release_parts(const TermParts& parts) {
           *parts.laws,
           parts.stabilization.get(),
           shifted ? ConstFieldView(parts.consistency->shift) : ConstFieldView{},
-          parts.consistency ? std::span<const double>(parts.consistency->factors) : std::span<const double>()};
+          parts.consistency ? std::span<const double>(parts.consistency->factors) : std::span<const double>(),
+          parts.damage && parts.damage->copies};
 }
 
 /// What the criterion looks at with these kinematics.

@@ -69,7 +69,7 @@ PartDescription description() {
           "equal:  w_c = Gc/(sum xi.n V_j over these) -> 4 Gc/(pi delta^4) (3D), 3 Gc/(2 h delta^3) (2D)\n"
           "softening r: b = (r^1/2 - q)/(q (r - 1)), q = (w_ij/w_c)^1/2 from r^-1/2 to r^1/2, the largest so far",
       .source = "Foster, Silling, Chen, International Journal for Multiscale Computational Engineering 9 (2011) 675",
-      .limits = "bonds that are shorter than at rest never break; not with held faces, symmetry or periodic sides"};
+      .limits = "bonds that are shorter than at rest never break"};
   part.parameters.number("energy_release_rate", "J/m^2", "Gc: energy that a new crack takes per area.").require().positive();
   part.parameters
       .number("softening", "-",

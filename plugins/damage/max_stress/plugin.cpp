@@ -50,9 +50,7 @@ PartDescription description() {
       .equations =
           "b = 0 once sigma_1 > strength and s > 0,  sigma_1 the largest principal Cauchy stress of the bond's evaluation points",
       .source = "Rankine's criterion, at bonds",
-      .limits =
-          "not of pair laws, which have no stress; what a crack costs per area depends on the horizon; not with held faces, "
-          "symmetry or periodic sides"};
+      .limits = "not of pair laws, which have no stress; what a crack costs per area depends on the horizon"};
   part.parameters.number("strength", "Pa", "Largest principal Cauchy stress that a bond bears.").require().positive();
   return part;
 }

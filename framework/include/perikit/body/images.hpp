@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "perikit/body/body.hpp"
@@ -53,6 +54,16 @@ struct HeldPoint {
   int component, motion;
 };
 
+/// The symmetry operation that takes a point to one of its images. Planes across the axes and periods are x -> sign x + shift by axis. Where a body has
+/// surfaces, its mirrors are numbered, and `mirrors` names those that the point was reflected at, the last one first.
+struct SymmetryOperation {
+  std::array<std::int8_t, 3> sign{1, 1, 1};
+  std::array<double, 3> shift{};               ///< [m]
+  std::string mirrors = {};
+  /// -1 after an odd number of reflections at planes that hold displacements along them and none across: stresses turn their sign there.
+  std::int8_t of_stress = 1;
+};
+
 /// An image on a point of a lattice, or on another image.
 class OverlappingImage : public std::domain_error {
  public:
@@ -65,6 +76,7 @@ struct Images {
   std::vector<std::int32_t> source;            ///< input numbers
   std::vector<double> volume;                  ///< over that of the source
   std::vector<std::array<std::int8_t, 3>> sign;
+  std::vector<SymmetryOperation> operation;
   std::vector<ImageTerm> terms;                ///< ascending by image
   std::vector<HeldPoint> held;                 ///< ascending by point; the last one of a component governs it
   std::vector<Crack> cracks;                   ///< of the body, and their images

@@ -37,12 +37,25 @@ Point image_of(const ImagePlane& plane, Point x) {
   return x;
 }
 
+SymmetryOperation followed_by(SymmetryOperation operation, const ImagePlane& plane) {
+  const auto a = static_cast<std::size_t>(plane.axis);
+  if (plane.period > 0) {
+    operation.shift[a] += plane.outward * plane.period;
+    return operation;
+  }
+  operation.sign[a] = static_cast<std::int8_t>(-operation.sign[a]);
+  operation.shift[a] = 2 * plane.at - operation.shift[a];
+  if (!plane.odd[a]) operation.of_stress = static_cast<std::int8_t>(-operation.of_stress);
+  return operation;
+}
+
 ImageList::ImageList(int dimension, const Point& x, std::int64_t number, std::int32_t source, Images& images)
     : dimension_(dimension),
       number_(number),
       source_(source),
       before_(images.size()),
       position_{x},
+      operation_(1),
       first_(2, images.terms.size()),
       images_(images) {}
 
@@ -51,7 +64,7 @@ void ImageList::hold(const std::array<bool, 3>& odd, const std::array<int, 3>& m
     if (const auto i = static_cast<std::size_t>(c); odd[i]) images_.held.push_back({source_, c, motion[i]});
 }
 
-void ImageList::add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion) {
+void ImageList::add(std::size_t n, const ImagePlace& image, const SymmetryOperation& operation, const std::array<bool, 3>& odd, const std::array<int, 3>& motion) {
   const auto number = static_cast<std::int32_t>(images_.size());
   const bool real = n == 0;
   const std::array<std::int8_t, 3> of = real ? std::array<std::int8_t, 3>{1, 1, 1} : images_.sign[before_ + n - 1];
@@ -75,7 +88,9 @@ void ImageList::add(std::size_t n, const ImagePlace& image, const std::array<boo
   images_.source.push_back(source_);
   images_.sign.push_back(sign);
   images_.volume.push_back(image.volume * volume);
+  images_.operation.push_back(operation);
   position_.push_back(image.at);
+  operation_.push_back(operation);
   first_.push_back(images_.terms.size());
 }
 
@@ -85,6 +100,7 @@ void append_image(const Images& made, std::size_t k, std::int32_t source, Images
   images.source.push_back(source);
   images.volume.push_back(made.volume[k]);
   images.sign.push_back(made.sign[k]);
+  images.operation.push_back(made.operation[k]);
   for (ImageTerm term : made.terms) {
     if (term.image != static_cast<std::int32_t>(k)) continue;
     term.image = number;

@@ -24,11 +24,13 @@ class ImageList {
   /// Of the point, which planes are asked for; its input number.
   const Point& point() const { return position_.front(); }
   std::int64_t number() const noexcept { return number_; }
+  /// Takes the point to place n.
+  const SymmetryOperation& operation(std::size_t n) const { return operation_[n]; }
 
   /// The point lies on a mirror, and its odd components are those of the mirror's motion.
   void hold(const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
-  /// The image of place n. odd: components that turn their sign; motion: which motions these have at the mirror, -1: none.
-  void add(std::size_t n, const ImagePlace& image, const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
+  /// The image of place n. operation: takes the point to it; odd: components that turn their sign; motion: which motions these have at the mirror, -1: none.
+  void add(std::size_t n, const ImagePlace& image, const SymmetryOperation& operation, const std::array<bool, 3>& odd, const std::array<int, 3>& motion);
 
  private:
   int dimension_;
@@ -36,6 +38,7 @@ class ImageList {
   std::int32_t source_;
   std::size_t before_;              ///< images of other points
   std::vector<Point> position_;     ///< the point, then its images
+  std::vector<SymmetryOperation> operation_;  ///< of each of them
   std::vector<std::size_t> first_;  ///< first term of each of them, and the end
   Images& images_;
 };
@@ -55,6 +58,8 @@ void append_held(const Images& made, std::int32_t source, Images& images);
 /// Distance of a place in front of the plane whose points it takes: itself, or the opposite side.
 double depth(const ImagePlane& plane, const Point& x);
 Point image_of(const ImagePlane& plane, Point x);
+/// The operation, and after it the reflection at the plane, or the shift by its period.
+SymmetryOperation followed_by(SymmetryOperation operation, const ImagePlane& plane);
 /// Appends images of what of the cracks lies in front of the plane.
 void mirror_cracks(const ImagePlane& plane, std::vector<Crack>& cracks);
 

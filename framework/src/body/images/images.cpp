@@ -26,7 +26,7 @@ void add_across(std::span<const ImagePlane> all, std::span<const std::size_t> ac
     Point foot = list.position(n);
     foot[static_cast<std::size_t>(plane.axis)] = plane.at;
     if (mirror && on_plane && n == 0) list.hold(plane.odd, plane.motion);
-    list.add(n, {mirror && on_plane ? list.position(n) : image_of(plane, list.position(n)), foot, 1.0, surface}, plane.odd, plane.motion);
+    list.add(n, {mirror && on_plane ? list.position(n) : image_of(plane, list.position(n)), foot, 1.0, surface}, followed_by(list.operation(n), plane), plane.odd, plane.motion);
     from.push_back(k);
     return true;
   };

@@ -28,6 +28,8 @@ class Mirror {
   virtual double behind(const Point& x) const = 0;
   const std::array<bool, 3>& odd() const noexcept { return odd_; }
   const std::array<int, 3>& motion() const noexcept { return motion_; }
+  /// See SymmetryOperation::of_stress.
+  virtual bool turns_stress() const noexcept { return false; }
 
  private:
   std::array<bool, 3> odd_;
@@ -53,6 +55,7 @@ class PlaneMirror final : public Mirror {
     return Reflected{{on_plane ? x : image_of(plane_, x), foot, 1.0, surface}, on_plane ? 0 : d};
   }
   double behind(const Point& x) const override { return std::max(0.0, -depth(plane_, x)); }
+  bool turns_stress() const noexcept override { return !plane_.odd[static_cast<std::size_t>(plane_.axis)]; }
 
  private:
   ImagePlane plane_;
@@ -135,8 +138,11 @@ void TurningMirrors::add_images(ImageList& list) const {
         const auto reflected = mirrors_[k]->reflect(list, n);
         const bool on_mirror = reflected && reflected->depth == 0;
         if (!reflected || (on_mirror && n > 0 && (list.position(n) != list.point() || from[n] >= k)) || !deepest(k, reflected->place.at, reflected->depth)) continue;
+        SymmetryOperation operation = list.operation(n);
+        operation.mirrors.insert(0, 1, static_cast<char>(k));
+        if (mirrors_[k]->turns_stress()) operation.of_stress = static_cast<std::int8_t>(-operation.of_stress);
         if (on_mirror && n == 0) list.hold(mirrors_[k]->odd(), mirrors_[k]->motion());
-        list.add(n, reflected->place, mirrors_[k]->odd(), mirrors_[k]->motion());
+        list.add(n, reflected->place, operation, mirrors_[k]->odd(), mirrors_[k]->motion());
         from.push_back(k);
         more = true;
       }

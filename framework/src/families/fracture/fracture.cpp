@@ -8,6 +8,7 @@
 #include <map>
 
 #include "core/each_once.hpp"
+#include "families/fracture/bond_copies.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/rank_values.hpp"
@@ -46,7 +47,7 @@ std::vector<Fracture::Found> Fracture::found(std::span<const BondChange> changes
   const bool share = shared_.part() && !damage_.by_stretch();
   std::vector<BondId> bonds;
   for (const BondChange& change : changes)
-    if (!share || families_.body().owns(static_cast<std::size_t>(change.bond.point))) bonds.push_back(change.bond);
+    if (!share || knows(change.bond)) bonds.push_back(change.bond);
   std::vector<double> start(bonds.size()), end(bonds.size()), moments(bonds.size(), 0.5), excesses(bonds.size());
   if (inside) finder_->values(bonds, at.moved_to(before), start);
   finder_->values(bonds, at, end);
@@ -82,6 +83,31 @@ std::vector<Fracture::Found> Fracture::found(std::span<const BondChange> changes
     all[k].excess = excesses[k];
   }
   return all;
+}
+
+bool Fracture::knows(BondId bond) const {
+  if (!damage_.copies) return families_.body().owns(static_cast<std::size_t>(bond.point));
+  std::vector<BondCopies::Copy> copies;
+  damage_.copies->find(bond.point, bond.far, copies);
+  return damage_.copies->decides(copies);
+}
+
+/// Each bond once, where its first point is. Where there are images, bonds count by their ends that are none, so that half of a body has the moments
+/// of the whole; all of them alike where there are images alone.
+double Fracture::mean_moment(std::span<const Found> found) const {
+  const perikit::Body& body = families_.body();
+  ExactSum sum, of_images;
+  std::array<std::int64_t, 2> count{};
+  for (const Found& f : found) {
+    if (!body.owns(static_cast<std::size_t>(f.change.bond.point))) continue;
+    int ends = 0;
+    for (const std::int32_t end : {f.change.bond.point, f.change.bond.far}) ends += !body.image(static_cast<std::size_t>(end));
+    (ends > 0 ? sum : of_images).add((ends > 0 ? ends : 1) * f.moment);
+    count[ends > 0 ? 0 : 1] += ends > 0 ? ends : 1;
+  }
+  communicator().sum(count);
+  if (count[0] > 0) return total_over_ranks(sum) / static_cast<double>(count[0]);
+  return count[1] > 0 ? total_over_ranks(of_images) / static_cast<double>(count[1]) : -1;
 }
 
 /// Which bonds stay must follow from what they do, not from their places in the body: bonds whose excess is the same but for rounding, as those of
@@ -143,18 +169,12 @@ BondUpdate Fracture::update(const Configuration& at, double elapsed, const StepI
   // Those of each half of the step at the mean of their moments.
   for (const bool early : {true, false}) {
     std::vector<Found> of_half;
-    ExactSum sum;
-    std::int64_t count = 0;  // each bond once, where its first point is
     for (const Found& f : all) {
       if (f.moment == retry_later || (f.moment < 0.5) != early || families_.integrity(f.change.bond) <= f.change.integrity) continue;
       of_half.push_back(f);
-      if (!families_.body().owns(static_cast<std::size_t>(f.change.bond.point))) continue;
-      sum.add(f.moment);
-      ++count;
     }
-    communicator().sum({&count, 1});
-    if (count == 0) continue;
-    const double moment = total_over_ranks(sum) / static_cast<double>(count);
+    const double moment = mean_moment(of_half);
+    if (moment < 0) continue;
     if (!early) step.begin(before_);   // points that lost bonds were elsewhere
     combine(1 - moment, before_, moment, u, at_);
     // The bonds act until they fail, at `moment`. A step has the forces of its beginning for the first half, and those of its end, which are to be
@@ -357,8 +377,9 @@ std::vector<BondId> Fracture::fragments(std::span<const std::int32_t> points) co
   // Others know the whole families of their own points alone.
   std::vector<std::int32_t> own;
   std::ranges::copy_if(points, std::back_inserter(own),
-                       [&](std::int32_t p) { return families_.body().owns(static_cast<std::size_t>(p)); });
+                       [&](std::int32_t p) { return families_.body().owns(static_cast<std::size_t>(p)) && !(damage_.copies && damage_.copies->image(p)); });
   std::vector<BondId> bonds = families_.fragment_bonds(own);
+  if (damage_.copies) damage_.copies->add_copies(bonds);
   const Field& limit = damage_.last();
   std::erase_if(bonds, [&](BondId b) { return !std::isfinite(limit.data()[b.point] + limit.data()[b.far]); });
   return shared_.of_all(bonds);

@@ -68,6 +68,10 @@ class Fracture {
   using Ties = std::vector<std::vector<BondChange>>;
   /// before: at the beginning of the explicit step that ends here; without data bonds fail here.
   std::vector<Found> found(std::span<const BondChange> changes, ConstFieldView before, const Configuration& at);
+  /// Whether this rank knows what the criterion says of the bond, as no other one does.
+  bool knows(BondId bond) const;
+  /// The mean moment of these bonds of all ranks, which must call it; below 0: there are none.
+  double mean_moment(std::span<const Found> found) const;
   /// All ranks must call it.
   Ties ties(std::span<const Found> found) const;
   GroupMarks dependent_on(std::span<const std::int32_t> ends, const Body& body) const;
