@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "body/family_limit.hpp"
 #include "perikit/core/errors.hpp"
 #include "perikit/influence.hpp"
 #include "plugin/registry.hpp"
@@ -36,6 +37,18 @@ TEST_CASE("influence functions take their values by hand calculation") {
   check(influence("cone"), {0.9, 0.75, 0.5, 0.25, 0});
   check(influence("gaussian"), {std::exp(-0.01), std::exp(-0.0625), std::exp(-0.25), std::exp(-0.5625), std::exp(-1.0)});
   check(influence("cubic_spline"), {0.946, 0.71875, 0.25, 0.03125, 0});
+}
+
+TEST_CASE("a bond as long as the horizon is so in any units, and has the influence of r = 1, which may be none") {
+  for (const double spacing : {1.0, 0.1, 0.3, 0.007, 1e-3, 123.4})
+    for (const double lower : {0.0, 0.37, -12.1})
+      for (const int cells : {1, 2, 3, 5}) {
+        CAPTURE(spacing);
+        CAPTURE(lower);
+        const double from = lower + 0.5 * spacing, to = lower + (cells + 0.5) * spacing;
+        CHECK(relative_length(to - from, cells * spacing) == 1.0);
+      }
+  CHECK(relative_length(1.0, 2.0) == 0.5);
 }
 
 TEST_CASE("a formula in r is an influence function") {

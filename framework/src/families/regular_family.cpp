@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/family_limit.hpp"
+
 namespace perikit {
 
 FamilyArrays regular_family(const Families& families) {
@@ -24,7 +26,7 @@ FamilyArrays regular_family(const Families& families) {
     }
     family.length[k] = std::sqrt(square);
     family.volume[k] = body.section() * std::pow(body.spacing(), body.dimension());
-    r.push_back(std::min(1.0, family.length[k] / body.horizon()));
+    r.push_back(relative_length(family.length[k], body.horizon()));
   }
   if (families.needs().influence) families.influence()->evaluate(r, omega);
   std::ranges::copy(omega, family.omega.begin());

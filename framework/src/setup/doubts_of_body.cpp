@@ -6,6 +6,7 @@
 #include <cmath>
 #include <exception>
 
+#include "body/family_limit.hpp"
 #include "families/normalised_influence.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/warnings.hpp"
@@ -93,7 +94,7 @@ void find_jumps(const Scene& scene, const Body& body, bool quasi_static, State& 
 void find_no_neighbours(const Scene& scene, const Families& families, std::vector<std::string>& found) {
   const Body& body = families.body();
   if (!families.needs().influence) return;
-  const double r = std::min(1.0, body.spacing() / body.horizon());
+  const double r = relative_length(body.spacing(), body.horizon());
   double omega = 0;
   families.influence()->evaluate({&r, 1}, {&omega, 1});
   if (omega >= 0.01) return;   // of its largest value

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "body/family_limit.hpp"
 #include "core/each_once.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "families/shape_tensor.hpp"
@@ -67,7 +68,7 @@ void CloudFamilies::measure() {
       const std::span<std::int32_t> family(lists_.neighbour.data() + lists_.first[p], neighbours(p).size());
       const Point x = body_.position(p);
       r.clear();
-      for (const std::int32_t j : family) r.push_back(std::min(1.0, std::sqrt(squared(position[j] - position[p])) / body_.horizon()));
+      for (const std::int32_t j : family) r.push_back(relative_length(std::sqrt(squared(position[j] - position[p])), body_.horizon()));
       omega.assign(r.size(), 1.0);
       if (needs_.influence) {
         influence_->evaluate(r, omega);

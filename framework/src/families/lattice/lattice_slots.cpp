@@ -6,6 +6,8 @@
 #include <map>
 #include <numeric>
 
+#include "body/family_limit.hpp"
+
 namespace perikit {
 
 LatticeSlots::LatticeSlots(const Lattice& lattice, double horizon, const InfluenceFunction* influence) : offsets(family_offsets(lattice, horizon)) {
@@ -14,7 +16,7 @@ LatticeSlots::LatticeSlots(const Lattice& lattice, double horizon, const Influen
   for (const auto& d : offsets) {
     shifts.push_back(lattice.shift(d));
     const double length = std::sqrt(double(d[0]) * d[0] + double(d[1]) * d[1] + double(d[2]) * d[2]) * lattice.spacing;
-    r.push_back(std::min(1.0, length / horizon));
+    r.push_back(relative_length(length, horizon));
     auto& bond = xi.emplace_back();
     bond.fill(0.0);
     for (std::size_t k = 0; k < 3; ++k) bond[static_cast<std::size_t>(lattice.axis[k])] = d[k] * lattice.spacing;
