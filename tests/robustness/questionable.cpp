@@ -37,6 +37,8 @@ TEST_CASE("questionable: cracks that cut nothing") {
   for (const std::string segment : {"[[20, 0], [20, 5]]", "[[1e300, 0], [1e300, 1e300]]", "[[4, 6], [4, 8]]"})
     warned(plate + "[[crack]]\nsegment = [[4, -1], [4, 2]]\n[[crack]]\nsegment = " + segment + "\n", "",
            "crack.1 (line 46) cuts no bond of the body");
+  for (const std::string segment : {"[[3.5, -1], [3.5, 2]]", "[[-1, 5], [3, 1]]"})
+    warned(plate + "[[crack]]\nsegment = " + segment + "\n", "", "crack.0 (line 44) passes through points of the body, which all count to one side of it");
 }
 
 TEST_CASE("questionable: boundaries that contradict each other") {

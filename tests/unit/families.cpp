@@ -89,6 +89,19 @@ void check_equal(const Plates& plates) {
 
 }  // namespace
 
+TEST_CASE("families: points on a crack count to one side of it, all to the same") {
+  // Cells of 0.1; a crack along either diagonal passes through their centres, whose coordinates are rounded.
+  const auto point = [](int i, int j) { return Point{(i + 0.5) * 0.1, (j + 0.5) * 0.1, 0}; };
+  const Crack along({{-0.05, -0.05, 0}, {0.7, 0.7, 0}}), against({{-0.05, 1.05, 0}, {0.7, 0.3, 0}});
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) {
+      CHECK_FALSE(along.cuts(point(i, i), point(j, j)));
+      CHECK_FALSE(against.cuts(point(i, 9 - i), point(j, 9 - j)));
+      CHECK(along.cuts(point(i, i), point(j, j + 1)) == along.cuts(point(0, 0), point(0, 1)));
+      CHECK(against.cuts(point(i, 9 - i), point(j, 8 - j)) == against.cuts(point(0, 9), point(0, 8)));
+    }
+}
+
 TEST_CASE("families: a lattice and a cloud of the same points, with a pre-crack") {
   const Plates plates;
   CHECK(plates.lattice->bonds() == plates.cloud->bonds());

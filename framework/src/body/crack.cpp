@@ -12,7 +12,7 @@ double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + 
 Point cross(const Point& a, const Point& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-/// Slack for bonds that pass exactly through an end or an edge, relative to the crack's size.
+/// Slack for points on the crack and for bonds that pass exactly through an end or an edge, relative to the crack's size.
 constexpr double slack = 1e-9;
 
 /// x lies in the plane polygon: the number of edges that a ray crosses is odd, or x lies on an edge.
@@ -63,7 +63,10 @@ bool Crack::near(const Point& x, double length) const noexcept {
 
 bool Crack::cuts(const Point& a, const Point& b) const noexcept {
   const double side_a = dot(minus(a, vertices_[0]), normal_), side_b = dot(minus(b, vertices_[0]), normal_);
-  if ((side_a >= 0) == (side_b >= 0)) return false;
+  // The normal is as long as the crack, or as large as its area. Points on the crack count to one side, all to the same.
+  const double square = dot(normal_, normal_), size = vertices_.size() > 2 ? std::sqrt(std::sqrt(square)) : std::sqrt(square);
+  const double on_crack = -slack * size * std::sqrt(square);
+  if ((side_a >= on_crack) == (side_b >= on_crack)) return false;
   const double s = side_a / (side_a - side_b);
   const Point x{a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2])};
   if (vertices_.size() > 2) return inside_polygon(vertices_, normal_, x);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <exception>
 
@@ -43,6 +44,27 @@ void find_idle_cracks(const Scene& scene, const Families& families, std::vector<
   for (std::size_t k = 0; k < std::min(cracks.size(), scene.cracks.size()); ++k)
     if (!cuts_any(cracks[k], families))
       found.push_back(named("crack", fmt::format("crack.{}{} cuts no bond of the body", k, line(scene.cracks[k].position))));
+}
+
+/// Whether a point lies on the crack: a way through it of this share of the spacing, along no plane that a scene is likely to have, is cut.
+bool passes_through_points(const Crack& crack, const Body& body) {
+  constexpr double share = 1e-5;
+  constexpr std::array<double, 3> direction = {1, 0.618, 0.382};
+  return std::ranges::any_of(body.owned(), [&](std::int32_t index) {
+    Point before = body.position(static_cast<std::size_t>(index)), after = before;
+    for (std::size_t a = 0; a < static_cast<std::size_t>(body.dimension()); ++a) {
+      before[a] -= share * body.spacing() * direction[a];
+      after[a] += share * body.spacing() * direction[a];
+    }
+    return crack.near(before, body.spacing()) && crack.cuts(before, after);
+  });
+}
+
+void find_cracks_through_points(const Scene& scene, const Body& body, std::vector<std::string>& found) {
+  for (std::size_t k = 0; k < std::min(body.cracks().size(), scene.cracks.size()); ++k)
+    if (communicator().largest(passes_through_points(body.cracks()[k], body) ? 1 : 0) > 0)
+      found.push_back(named("crack", fmt::format("crack.{}{} passes through points of the body, which all count to one side of it; a crack between two layers of points has no such doubt", k,
+                                                 line(scene.cracks[k].position))));
 }
 
 /// Loads act on held components, too: there the constraint takes them up.
@@ -110,6 +132,7 @@ std::vector<std::string> questionable(const Scene& scene, const Families& famili
                                       bool quasi_static, State& state) {
   std::vector<std::string> found;
   find_idle_cracks(scene, families, found);
+  find_cracks_through_points(scene, families.body(), found);
   find_held_loads(scene, families.body(), constraints, found);
   find_jumps(scene, families.body(), quasi_static, state, found);
   find_no_neighbours(scene, families, found);
