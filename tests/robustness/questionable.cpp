@@ -274,6 +274,9 @@ TEST_CASE("questionable: sets that rounding decides, and sets of one point") {
   };
   warned(stiff("x + y > 7"), "", "the limit of sets.stiff (line 13) passes through points of the lattice");
   silent(stiff("x > 4 && y > 2"));
+  const auto cut = [](const std::string& inside) { return replaced(plate, "spacing = 1.0\n", "spacing = 1.0\ninside = \"" + inside + "\"\n"); };
+  for (const char* inside : {"x < 7.5 || y < 2", "x <= 7.5 || y < 2"}) warned(cut(inside), "", "the surface of [body.lattice] inside passes through points of the lattice");
+  silent(cut("x < 7 || y < 2"));
 }
 
 TEST_CASE("questionable: horizons below two spacings") {

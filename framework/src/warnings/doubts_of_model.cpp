@@ -63,17 +63,35 @@ bool names_a_kind(const Scene& scene, const std::string& set) {
   return std::ranges::any_of(scene.regions, [&](const RegionDescription& region) { return region.set == set; }) || std::ranges::find(scene.no_fail, set) != scene.no_fail.end();
 }
 
-/// Whether the limit of the condition passes through points, so that rounding chooses among them. On a lattice its planes are met all along.
-bool decided_by_rounding(const Expression& condition, const Body& body) {
+/// Whether the limit of the condition passes through a place, so that rounding chooses.
+bool decided_by_rounding(const Expression& condition, const Point& x, const Body& body) {
   constexpr std::array<double, 3> direction = {1, 0.618, 0.382};   // along no plane that a scene is likely to have
   const double step = 1e-7 * body.spacing();
-  return std::ranges::any_of(body.owned(), [&](std::int32_t index) {
-    Point before = body.position(static_cast<std::size_t>(index)), after = before;
-    for (std::size_t a = 0; a < static_cast<std::size_t>(body.dimension()); ++a) {
-      before[a] -= step * direction[a];
-      after[a] += step * direction[a];
-    }
-    return (condition(before) != 0) != (condition(after) != 0);
+  Point before = x, after = x;
+  for (std::size_t a = 0; a < static_cast<std::size_t>(body.dimension()); ++a) {
+    before[a] -= step * direction[a];
+    after[a] += step * direction[a];
+  }
+  return (condition(before) != 0) != (condition(after) != 0);
+}
+
+/// The same through points of the body. On a lattice its planes are met all along.
+bool decided_by_rounding(const Expression& condition, const Body& body) {
+  return std::ranges::any_of(body.owned(), [&](std::int32_t p) { return decided_by_rounding(condition, body.position(static_cast<std::size_t>(p)), body); });
+}
+
+/// The same through points of the body, or through those beside it that `inside` left out.
+bool surface_decided_by_rounding(const LatticeDescription& lattice, const Body& body) {
+  const auto d = static_cast<std::size_t>(body.dimension());
+  return std::ranges::any_of(body.owned(), [&](std::int32_t p) {
+    const Point x = body.position(static_cast<std::size_t>(p));
+    for (std::size_t a = 0; a < d; ++a)
+      for (const double cells : {-1.0, 0.0, 1.0}) {
+        Point beside = x;
+        beside[a] += cells * body.spacing();
+        if (beside[a] > lattice.lower[a] && beside[a] < lattice.upper[a] && decided_by_rounding(*lattice.inside, beside, body)) return true;
+      }
+    return false;
   });
 }
 
@@ -114,6 +132,13 @@ void find_strange_sets(const Scene& scene, const Body& body, std::vector<std::st
   }
 }
 
+void find_ragged_surface(const Scene& scene, const Body& body, std::vector<std::string>& lines) {
+  if (!scene.body.lattice || !scene.body.lattice->inside || scene.partial_volume || scene.random_points()) return;
+  const bool rounding = body.points_of_all_ranks() <= most_points && surface_decided_by_rounding(*scene.body.lattice, body);
+  if (communicator().largest(rounding ? 1 : 0) > 0)
+    lines.push_back(named("set", "the surface of [body.lattice] inside passes through points of the lattice: rounding decides which of them are in the body; a surface between two layers is safe"));
+}
+
 }  // namespace
 
 void find_doubts_of_model(const Scene& scene, const BodyProblem& problem, std::vector<std::string>& lines) {
@@ -121,6 +146,7 @@ void find_doubts_of_model(const Scene& scene, const BodyProblem& problem, std::v
   find_nothing_acts(scene, lines);
   find_strange_sets(scene, problem.body(), lines);
   find_far_places(scene, problem.body(), lines);
+  find_ragged_surface(scene, problem.body(), lines);
 }
 
 }  // namespace perikit
