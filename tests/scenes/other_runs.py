@@ -189,9 +189,9 @@ def changed(kind, trial, out, done):
 
 
 def unstable(folder):
-    """Whether rounding says where the body goes, whose equilibria are no minima of the energy, or which points a set has."""
+    """Whether rounding says where the body goes, whose equilibria are no minima of the energy, or which side a point is on."""
     with open(folder + "/run.log") as log:
-        return re.search("warning:.*(stable|positive definite|rounding decides)", log.read()) is not None
+        return re.search("warning:.*(stable|positive definite|rounding decides|passes through points)", log.read()) is not None
 
 
 def pairing(X, Y):
