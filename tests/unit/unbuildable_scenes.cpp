@@ -176,8 +176,6 @@ const Fault faults[]{
     {"body.lattice", "jitter", "0.1", SURFACE("x - 6.2") SURFACE("2*x - 12.4"), 1005, "boundary.2.surface", "found a surface that boundary.1.surface has too", "one of the two"},
     {"body.lattice", "jitter", "0.1", SURFACE("x - 6.2") "[[symmetry]]\naxis = \"x\"\nat = 6.2\n", 1002, "boundary.1.surface",
      "found a surface that symmetry.0.axis has too", "one of the two"},
-    {"body.lattice", "jitter", "0.1", SURFACE("x - 6.2") "[[crack]]\nsegment = [[3, 2], [9, 2]]\n", 1002, "boundary.1.surface",
-     "found crack.0 within two horizons of the surface", "cracks that end farther away"},
     {"body.lattice", "jitter", "0.1", SURFACE("-0.3 - x"), 24, "boundary.0", "held in x, and its face by another", "one of them"},
     {"kinematics", "type", "\"bond_based\"", "[[output.history]]\nname = \"s\"\nquantity = \"cauchy\"\ncomponent = \"xx\"\n",
      1003, "output.history.0.quantity", "found \"cauchy\"", "displacement"},

@@ -72,6 +72,8 @@ class TurningMirrors {
   TurningMirrors(const BodyFrame& frame, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces);
   ~TurningMirrors();
   void add_images(ImageList& list) const;
+  /// Appends images of what of the cracks lies in front of them.
+  void add_cracks(std::vector<Crack>& cracks) const;
 
  private:
   double even_;

@@ -84,9 +84,7 @@ void ImageMaker::add(const Point& x, std::int64_t number, std::int32_t source, I
 }
 
 std::vector<Crack> ImageMaker::cracks(std::vector<Crack> cracks) const {
-  if (turning_)
-    for (const ImagePlane& plane : planes_)
-      if (plane.period == 0) mirror_cracks(plane, cracks);
+  if (turning_) turning_->add_cracks(cracks);
   for (const std::vector<std::size_t>& across : across_)
     for (const std::size_t k : across) mirror_cracks(planes_[k], cracks);
   return cracks;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "body/images/curved_cracks.hpp"
 #include "body/images/image_list.hpp"
 #include "body/points/level_surface.hpp"
 
@@ -26,6 +27,8 @@ class Mirror {
   virtual std::optional<Reflected> reflect(const ImageList& list, std::size_t n) const = 0;
   /// How far a place lies behind the mirror; 0 in front of it.
   virtual double behind(const Point& x) const = 0;
+  /// Appends images of what of the cracks lies in front of the mirror.
+  virtual void add_cracks(std::vector<Crack>& cracks) const = 0;
   const std::array<bool, 3>& odd() const noexcept { return odd_; }
   const std::array<int, 3>& motion() const noexcept { return motion_; }
   /// See SymmetryOperation::of_stress.
@@ -55,6 +58,7 @@ class PlaneMirror final : public Mirror {
     return Reflected{{on_plane ? x : image_of(plane_, x), foot, 1.0, surface}, on_plane ? 0 : d};
   }
   double behind(const Point& x) const override { return std::max(0.0, -depth(plane_, x)); }
+  void add_cracks(std::vector<Crack>& cracks) const override { mirror_cracks(plane_, cracks); }
   bool turns_stress() const noexcept override { return !plane_.odd[static_cast<std::size_t>(plane_.axis)]; }
 
  private:
@@ -77,17 +81,9 @@ class SurfaceMirror final : public Mirror {
     if (!(surface_.level(x) < 0) || surface_.estimate(x) > far * reach_) return std::nullopt;
     const std::optional<Foot> foot = surface_.foot(x);
     if (!foot || !(foot->depth > 0) || foot->depth > reach_ || !(foot->stretch > 0)) return std::nullopt;
-    Point image{};
-    for (std::size_t c = 0; c < 3; ++c) image[c] = 2 * foot->at[c] - x[c];
-    if (!(surface_.level(image) > 0)) return std::nullopt;
-    // In a narrow hole the opposite side may be nearer: its images are there.
-    const std::optional<Foot> back = surface_.foot(image);
-    constexpr double same = 0.01;  // spacings
-    if (!back) return std::nullopt;
-    double square = 0;
-    for (std::size_t c = 0; c < 3; ++c) square += (back->at[c] - foot->at[c]) * (back->at[c] - foot->at[c]);
-    if (square > same * same * spacing_ * spacing_) return std::nullopt;
-    return Reflected{{image, foot->at, foot->stretch, nearest_(foot->at, list.number())}, foot->depth};
+    const std::optional<Point> image = image_at(x, *foot);
+    if (!image) return std::nullopt;
+    return Reflected{{*image, foot->at, foot->stretch, nearest_(foot->at, list.number())}, foot->depth};
   }
   double behind(const Point& x) const override {
     if (!(surface_.level(x) > 0)) return 0;
@@ -96,8 +92,33 @@ class SurfaceMirror final : public Mirror {
     const std::optional<Foot> foot = surface_.foot(x);
     return foot && foot->depth < 0 ? -foot->depth : guess;
   }
+  void add_cracks(std::vector<Crack>& cracks) const override {
+    // One piece farther than points have images, so that what these see of a crack has no gap.
+    const auto image = [&](const Point& x) -> std::optional<Point> {
+      if (surface_.estimate(x) > far * reach_) return std::nullopt;
+      const std::optional<Foot> foot = surface_.foot(x);
+      if (!foot || foot->depth > reach_ + spacing_ || !(foot->stretch > 0)) return std::nullopt;
+      return foot->depth <= touching(spacing_) ? x : image_at(x, *foot);
+    };
+    mirror_cracks({[&](const Point& x) { return surface_.level(x); }, image, spacing_}, cracks);
+  }
 
  private:
+  /// At the other end of the straight line through the foot; nullopt where another part of the surface is nearer to it.
+  std::optional<Point> image_at(const Point& x, const Foot& foot) const {
+    Point image{};
+    for (std::size_t c = 0; c < 3; ++c) image[c] = 2 * foot.at[c] - x[c];
+    if (!(surface_.level(image) > 0)) return std::nullopt;
+    // In a narrow hole the opposite side may be nearer: its images are there.
+    const std::optional<Foot> back = surface_.foot(image);
+    constexpr double same = 0.01;  // spacings
+    if (!back) return std::nullopt;
+    double square = 0;
+    for (std::size_t c = 0; c < 3; ++c) square += (back->at[c] - foot.at[c]) * (back->at[c] - foot.at[c]);
+    if (square > same * same * spacing_ * spacing_) return std::nullopt;
+    return image;
+  }
+
   /// Estimates of distances are off where surfaces are bent.
   static constexpr double far = 3;
 
@@ -117,6 +138,10 @@ TurningMirrors::TurningMirrors(const BodyFrame& frame, std::span<const ImagePlan
 }
 
 TurningMirrors::~TurningMirrors() = default;
+
+void TurningMirrors::add_cracks(std::vector<Crack>& cracks) const {
+  for (const auto& mirror : mirrors_) mirror->add_cracks(cracks);
+}
 
 void TurningMirrors::add_images(ImageList& list) const {
   const auto deepest = [&](std::size_t own, const Point& x, double depth) {

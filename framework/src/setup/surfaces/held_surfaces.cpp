@@ -44,10 +44,7 @@ class SurfaceBuilder {
     if (at_surface_->none())
       refuse("found a surface that no point touches", "an expression that is zero on a side of the body and negative inside");
     check([&] {
-      for (const PlacedPoints::OnePoint& point : at_surface_->mine()) {
-        check_thickness(point.x);
-        check_cracks(point.x);
-      }
+      for (const PlacedPoints::OnePoint& point : at_surface_->mine()) check_thickness(point.x);
     });
     ImageSurface surface{level_of(*boundary_.surface), {}, [at_surface = at_surface_](const Point& foot, std::int64_t otherwise) {
                            return at_surface->nearest(foot, otherwise);
@@ -123,14 +120,6 @@ class SurfaceBuilder {
                        "horizons, {:.3g}, straight below it",
                        place(foot->at), reach),
            "a smaller horizon, or a [[boundary]] for each of two sides");
-  }
-
-  /// Mirror images of cracks would not be plane.
-  void check_cracks(const Point& x) const {
-    for (std::size_t k = 0; k < frame_.cracks.size(); ++k)
-      if (frame_.cracks[k].near(x, halo(frame_.horizon)))
-        refuse(fmt::format("found crack.{} within two horizons of the surface, near {}, which has no image there", k, place(x)),
-               "cracks that end farther away, or a face across an axis");
   }
 
   const PlacedPoints& points_;
