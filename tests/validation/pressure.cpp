@@ -89,6 +89,50 @@ TEST_CASE("a pressure all around holds a uniform stress in equilibrium, point by
       }
 }
 
+TEST_CASE("a following pressure holds a uniform stress in equilibrium beside held faces and surfaces, point by point") {
+  const std::string plane = "[initial]\ndisplacement = [\"0.1*x\", \"0.1*y\"]\n[[load]]\nset = \"all\"\npressure = 1.0\nfollower = true\n[integrator]\ntype = \"evaluate\"\n",
+                    held = "displacement = [\"0.1*x\", \"0.1*y\"]\n", face = "[[boundary]]\nface = \"-x\"\n" + held;
+  const std::string cloud = std::string(plate.body) + "jitter = 0.1\n";
+  const double P = stress(plate, 1.1);
+  struct Held {
+    BodyText body;
+    std::string sides;
+  };
+  for (const Held& c : {Held{plate, face}, Held{plate, face + "[[boundary]]\nface = \"+y\"\n" + held}, Held{plate, face + "[[symmetry]]\naxis = \"y\"\n"},
+                        Held{{cloud.c_str(), 2, 1.1}, "[[boundary]]\nsurface = \"-0.04 - x\"\n" + held}})
+    for (const char* kinematics : {"conventional", "baqp", "projection", "bond_associated", "sub_horizon", "bond_augmented"}) {
+      INFO(kinematics, "\n", c.sides);
+      const auto simulation = under_pressure(c.body, kinematics, plane + c.sides);
+      BodyProblem& problem = simulation->problem();
+      Field force = problem.make_field(), external = problem.make_field();
+      const ConstFieldView u = problem.state().displacement();
+      REQUIRE(problem.evaluate_forces(u, force, nullptr).ok());
+      REQUIRE(problem.external_forces(u, 1.0, external).ok());
+      double largest = 0, left = 0;
+      for (const std::int32_t p : problem.body().owned())
+        for (int a = 0; a < 2; ++a) {
+          const double load = -P / 1.1 * external.component(a)[p];
+          largest = std::max(largest, std::abs(load));
+          left = std::max(left, std::abs(force.component(a)[p] + load));
+        }
+      CHECK_MESSAGE(left <= 1e-11 * largest, "out of balance by ", left / largest);
+      // The tangent of the load, in a direction that moves the face, too.
+      Field w = problem.make_field(), K = problem.make_field(), ahead = problem.make_field(), behind = problem.make_field(), moved = problem.make_field();
+      for (const std::int32_t p : problem.body().internal())
+        for (int a = 0; a < 2; ++a) w.component(a)[p] = std::sin(3.0 * p + a);
+      REQUIRE(problem.add_load_stiffness(u, 1.0, w, K).ok());
+      const double h = 1e-6;
+      combine(1, u, h, w, moved);
+      REQUIRE(problem.external_forces(moved, 1.0, ahead).ok());
+      combine(1, u, -h, w, moved);
+      REQUIRE(problem.external_forces(moved, 1.0, behind).ok());
+      double off = 0;
+      for (const std::int32_t p : problem.body().internal())
+        for (int a = 0; a < 2; ++a) off = std::max(off, std::abs(K.component(a)[p] + (ahead.component(a)[p] - behind.component(a)[p]) / (2 * h)));
+      CHECK_MESSAGE(off <= 1e-7 * largest_magnitude(K), "the tangent is off by ", off / largest_magnitude(K));
+    }
+}
+
 TEST_CASE("a pressure all around holds a uniform one in equilibrium under selective kinematics, whose mean stress acts by the gradients of points") {
   const double stretch = 1.1, P = stress(block, stretch);
   for (const char* base : {"baqp", "projection", "bond_associated", "sub_horizon", "non_spherical", "bond_augmented"})

@@ -13,6 +13,7 @@
 #include "problem/companion.hpp"
 #include "problem/crossed_faces.hpp"
 #include "problem/history_record.hpp"
+#include "problem/image_gradients.hpp"
 #include "problem/loose/loose_points.hpp"
 #include "problem/loose/weak_springs.hpp"
 #include "problem/near_bonds.hpp"
@@ -198,7 +199,7 @@ EvaluationStatus BodyProblem::external_forces(const Configuration& at, FieldView
     for (int c = 0; c < H.components; c += dimension())
       ghosts_->forward({H.component(c), H.stride, std::min(dimension(), H.components - c)});
   }
-  if (images()) images()->mirror_gradients(samples.H);
+  if (images()) continue_gradients(*parts_.families, *images(), seen_, samples.H);
   loads().evaluate(at.time(), force, &samples.H);
   if (ghosts_) ghosts_->clear(force);
   return status;

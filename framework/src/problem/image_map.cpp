@@ -18,6 +18,7 @@ ImageMap::ImageMap(const Body& body, const Images& images) : body_(&body), map_(
   }
   for (const ImageTerm& term : images.terms) {
     const std::int32_t image = image_[static_cast<std::size_t>(term.image)];
+    if (term.motion >= 0 && (held_.empty() || held_.back() != image)) held_.push_back(image);
     if (body.owns(static_cast<std::size_t>(image))) shares_.push_back({image, term.surface, term.component, term.factor, term.at});
   }
 }

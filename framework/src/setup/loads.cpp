@@ -40,15 +40,10 @@ Load distributed(const LoadDescription& description, const TermParts& parts, con
   return load;
 }
 
-void refuse_pressure(const Scene& scene, const LoadDescription& load, const TermParts& parts) {
-  const auto refuse = [&](const std::string& text) { throw InputError(load.position, "load.pressure", text); };
-  if (!load.follower) return;
-  if (parts.formulation.pairs)
-    refuse("found with follower = true and a pair law, which has no deformation gradients; allowed: kinematics with gradients");
-  if (std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.holds_side(); }))
-    refuse(
-        "found with follower = true and a [[boundary]] with a face or surface, whose images have no deformation gradient of their own; "
-        "allowed: a boundary that holds a set");
+void refuse_pressure(const LoadDescription& load, const TermParts& parts) {
+  if (!load.follower || !parts.formulation.pairs) return;
+  throw InputError(load.position, "load.pressure",
+                   "found with follower = true and a pair law, which has no deformation gradients; allowed: kinematics with gradients");
 }
 
 Pressure pressure_on(const Body& body, const SpaceTimeFunction& value, SurfaceAreas areas) {
@@ -71,7 +66,7 @@ Loads build_loads(const Scene& scene, const TermParts& parts, const ImageMap* im
   for (const LoadDescription& description : scene.loads) {
     refuse_ramp(description.ramp, fmt::format("load.{}", &description - scene.loads.data()), quasi_static);
     if (description.type == LoadDescription::Type::pressure) {
-      refuse_pressure(scene, description, parts);
+      refuse_pressure(description, parts);
       const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
       Pressure pressure = pressure_on(body, value, surface_areas(description, parts, images));
       pressure.follows = description.follower;

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "perikit/body/images.hpp"
@@ -18,6 +19,8 @@ class ImageMap {
   ImageMap(const Body& body, const Images& images);
 
   std::size_t size() const noexcept { return image_.size(); }
+  /// Images behind faces and surfaces that are held, internal indices.
+  std::span<const std::int32_t> held() const noexcept { return held_; }
   /// u of the problem -> u of the terms.
   void extend(FieldView u) const;
   /// Forces of the terms -> forces of the problem.
@@ -59,6 +62,7 @@ class ImageMap {
 
   const Body* body_;
   std::vector<std::int32_t> image_, source_;   ///< internal indices
+  std::vector<std::int32_t> held_;
   std::vector<std::array<double, 3>> sign_;
   std::vector<Share> shares_;
   std::vector<std::int32_t> map_;              ///< by internal index: number of the image, -1

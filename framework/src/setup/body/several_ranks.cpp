@@ -17,9 +17,8 @@ void refuse_on_ranks(const Scene& scene, const IntegratorTraits& integrator) {
 }
 
 bool sets_may_hold_sides(const Scene& scene) {
-  // Results of other runs do not say where sides were, and a pressure that follows needs gradients that images have not.
+  // Results of other runs do not say where sides were.
   return scene.body.points_file && !scene.initial_from &&
-         std::ranges::none_of(scene.loads, [](const LoadDescription& load) { return load.type == LoadDescription::Type::pressure && load.follower; }) &&
          std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return !boundary.holds_side(); });
 }
 
