@@ -244,7 +244,7 @@ std::string replaced(const Case& c) {
 
 TEST_CASE("the scene that the cases spoil is sound") {
   FakeCatalogue parts;
-  CHECK(message_of([&] { parse_scene(sound, "plate.toml", parts); }) == "no error");
+  CHECK(message_of([&] { parse_scene(sound, "plate.toml", parts); }).empty());
 }
 
 TEST_CASE("bad scenes are refused with line, key and reason") {
@@ -294,7 +294,7 @@ TEST_CASE("3D cracks are plane polygons, 1D bodies have none") {
         dimension, zeros, ones, crack);
     return message_of([&] { parse_scene(text, "cube.toml", parts); });
   };
-  CHECK(error(3, "polygon = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]") == "no error");
+  CHECK(error(3, "polygon = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]").empty());
   CHECK(contains(error(3, "polygon = [[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0]]"), "off the plane"));
   CHECK(contains(error(3, "polygon = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]"), "vertices on one line"));
   CHECK(contains(error(3, "segment = [[0, 0, 0], [1, 0, 0]]"), "polygon in 3D"));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "setup/body/body.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;
@@ -13,36 +14,12 @@ using namespace perikit::test;
 
 namespace {
 
-std::string refusal(double spacing, double ratio, double jitter, const char* inside = "") {
-  const std::string text = fmt::format(R"(format = 1
-[body]
-dimension = 3
-[body.lattice]
-spacing = {}
-lower = [0, 0, 0]
-upper = [1, 1, 1]
-jitter = {}
-{}
-[family]
-horizon_ratio = {}
-[kinematics]
-type = "baqp"
-[material]
-type = "neo_hookean"
-shear_modulus = 1.0
-bulk_modulus = 2.0
-[integrator]
-type = "newton"
-)",
-                                       spacing, jitter, inside, ratio);
+std::string refusal(double spacing, double ratio, double jitter, const std::string& inside = "") {
   FakeCatalogue parts;
+  const std::string text = SceneText{.dimension = 3, .spacing = spacing, .upper = {1, 1, 1}, .lattice = fmt::format("jitter = {}\n{}", jitter, inside),
+                                     .family = fmt::format("horizon_ratio = {}", ratio), .integrator = "newton"};
   const Scene scene = parse_scene(text, "plate.toml", parts);
-  try {
-    build_body(scene);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return message_of<InputError>([&] { build_body(scene); });
 }
 
 }  // namespace

@@ -2,16 +2,13 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
-#include <map>
-
 #include "files/atomic_file.hpp"
-#include "output/history_file.hpp"
 #include "output/result_file.hpp"
-#include "plugin/registry.hpp"
-#include "run/simulation.hpp"
+#include "tests/kit/runs.hpp"
 #include "unit/temporary_folder.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
@@ -25,21 +22,6 @@ std::string torn_plate(const std::string& more) {
          "damage = { type = \"critical_stretch\", stretch = 1e-4 }\n[initial]\nvelocity = [\"x > 0.6 ? 1 : -1\", 0]\n"
          "[integrator]\ntype = \"verlet\"\nend_time = 4e-3\n[output]\nfields = [\"fragment\", \"damage\"]\nframes = 1\nhistory = [" +
          more + "]\n";
-}
-
-std::map<std::string, std::vector<double>> columns_of(const std::string& scene, const std::filesystem::path& folder) {
-  static Registry registry;
-  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  Simulation simulation(parse_scene(scene, "plate.toml", registry), registry);
-  {
-    RunRecorder recorder(simulation, folder, false);
-    simulation.run(recorder);
-    recorder.finish();
-  }
-  const History history = read_history(folder / "history.csv");
-  std::map<std::string, std::vector<double>> columns;
-  for (std::size_t k = 0; k < history.columns.size(); ++k) columns[history.columns[k]] = history.values[k];
-  return columns;
 }
 
 }  // namespace

@@ -12,19 +12,14 @@
 #include <numbers>
 #include <random>
 
-#include "plugin/registry.hpp"
 #include "scene/scene.hpp"
 #include "terms/bond_energy_split.hpp"
+#include "tests/kit/registry.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
-
-Registry& parts() {
-  static Registry registry;
-  if (registry.names(Kind::damage).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  return registry;
-}
 
 struct Kernel {
   std::string name, type, table;
@@ -37,9 +32,9 @@ const std::vector<Kernel> kernels{{"constant", "constant", ""},
                                   {"exp(-9 r^2)", "expression", "formula = \"exp(-9*r^2)\""},
                                   {"5 exp(-9 r^2)", "expression", "formula = \"5*exp(-9*r^2)\""}};
 
-std::shared_ptr<const InfluenceFunction> influence(const Kernel& kernel) { return parts().influence(*parse_part(Kind::influence, kernel.type, kernel.table, parts())); }
+std::shared_ptr<const InfluenceFunction> influence(const Kernel& kernel) { return all_parts().influence(*parse_part(Kind::influence, kernel.type, kernel.table, all_parts())); }
 
-Formulation formulation(const std::string& kinematics) { return make_formulation(parts().kinematics(*parse_part(Kind::kinematics, kinematics, "", parts()))); }
+Formulation formulation(const std::string& kinematics) { return make_formulation(all_parts().kinematics(*parse_part(Kind::kinematics, kinematics, "", all_parts()))); }
 
 FamilyNeeds needs(const Formulation& f) { return {.influence = !f.pairs || f.pair_traits.influence, .shapes = !f.pairs}; }
 

@@ -8,21 +8,16 @@
 #include <numbers>
 
 #include "perikit/model/damage.hpp"
-#include "plugin/registry.hpp"
 #include "scene/scene.hpp"
+#include "tests/kit/registry.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
-Registry& parts() {
-  static Registry registry;
-  if (registry.names(Kind::damage).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  return registry;
-}
-
 std::unique_ptr<Damage> make(const std::string& type, const std::string& table) {
-  return parts().damage(*parse_part(Kind::damage, type, table, parts()));
+  return all_parts().damage(*parse_part(Kind::damage, type, table, all_parts()));
 }
 
 }  // namespace
@@ -147,7 +142,7 @@ TEST_CASE("[[interface]]: the criterion of [damage] with other numbers") {
         "[damage]\ntype = \"critical_energy\"\nenergy_release_rate = 1.0\n[integrator]\ntype = \"newton\"\n"
         "[[interface]]\nbetween = [\"rest\", \"left\"]\ndamage = " +
             damage + "\n",
-        "scene.toml", parts());
+        "scene.toml", all_parts());
   };
   const Scene read = scene("{ type = \"critical_energy\", energy_release_rate = 0.5 }");
   REQUIRE(read.interfaces.size() == 1);
@@ -168,7 +163,7 @@ TEST_CASE("[damage] second_law: its default follows from the kinematics and its 
                        "[family]\nhorizon_ratio = 3\n[kinematics]\n" + kinematics + "\n"
                        "[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.3\n"
                        "[damage]\ntype = \"max_stress\"\nstrength = 1.0\n" + key + "[integrator]\ntype = \"newton\"\n",
-                       "scene.toml", parts())
+                       "scene.toml", all_parts())
         .resolved;
   };
   const auto says = [](const std::string& text, const char* value) { return text.find(std::string("\nsecond_law = ") + value + "\n") != std::string::npos; };

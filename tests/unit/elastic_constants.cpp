@@ -7,7 +7,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/kit/messages.hpp"
+
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
@@ -19,16 +22,7 @@ Moduli convert(const Given& given) {
 }
 
 std::string refusal(const Given& given) {
-  try {
-    convert(given);
-  } catch (const std::domain_error& error) {
-    return error.what();
-  }
-  return "";
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
+  return message_of<std::domain_error>([&] { convert(given); });
 }
 
 }  // namespace

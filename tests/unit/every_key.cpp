@@ -5,8 +5,7 @@
 
 #include <map>
 
-#include "plugin/registry.hpp"
-#include "scene/scene.hpp"
+#include "tests/kit/registry.hpp"
 #include "unit/scene_draft.hpp"
 #include "unit/spoiled_values.hpp"
 
@@ -96,17 +95,10 @@ threads = 1
 seed = 1
 )";
 
-Registry& registry() {
-  static Registry parts;
-  static const bool filled = (parts.add_folder(PERIKIT_PLUGIN_FOLDER), true);
-  REQUIRE(filled);
-  return parts;
-}
-
 /// Lines of what the reader says.
 std::vector<std::string> messages(const std::string& scene) {
   try {
-    parse_scene(scene, "scene.toml", registry());
+    parse_scene(scene, "scene.toml", all_parts());
   } catch (const InputErrors& errors) {
     return errors.messages();
   } catch (const std::exception& error) {
@@ -142,7 +134,7 @@ class Refusals {
       check(changed, at, key + bad.key, bad.hint);
     }
     if (p.type == ParameterType::part) {
-      const std::string name = registry().names(p.kind).back();
+      const std::string name = all_parts().names(p.kind).back();
       SceneDraft changed = draft;
       check(changed, changed.set(section, p.name, quoted(misspelt(name))), key, "did you mean '" + name + "'");
     }
@@ -194,9 +186,9 @@ SceneDraft with_part(Kind kind, const PartDescription& part) {
 TEST_CASE("the scene that is spoilt key by key is sound, with every part in its place") {
   CHECK(messages(sound).empty());
   for (const Kind kind : all_kinds) {
-    for (const std::string& name : registry().names(kind)) {
+    for (const std::string& name : all_parts().names(kind)) {
       INFO(perikit::name(kind), "/", name);
-      const SceneDraft draft = with_part(kind, registry().describe(kind, name));
+      const SceneDraft draft = with_part(kind, all_parts().describe(kind, name));
       const std::vector<std::string> all = messages(draft.text());
       CAPTURE(draft.text());
       CHECK_MESSAGE(all.empty(), all.front());
@@ -246,8 +238,8 @@ TEST_CASE("every key of every section of a scene, spoilt in every way, is refuse
 TEST_CASE("every parameter of every part, spoilt in every way, is refused with its place") {
   Refusals refusals;
   for (const Kind kind : all_kinds) {
-    for (const std::string& name : registry().names(kind)) {
-      const PartDescription& part = registry().describe(kind, name);
+    for (const std::string& name : all_parts().names(kind)) {
+      const PartDescription& part = all_parts().describe(kind, name);
       const SceneDraft draft = with_part(kind, part);
       const Slot slot = slot_of(kind);
       for (const Parameter& p : part.parameters.parameters()) refusals.spoil(draft, slot.section, slot.path, p);

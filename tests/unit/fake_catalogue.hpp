@@ -8,6 +8,7 @@
 #include <map>
 
 #include "perikit/plugin/part.hpp"
+#include "tests/kit/messages.hpp"
 
 namespace perikit::test {
 
@@ -91,20 +92,5 @@ class FakeCatalogue final : public PartCatalogue {
  private:
   std::map<std::pair<Kind, std::string>, PartDescription> parts_;
 };
-
-/// What a call throws, or "no error".
-template <class Call>
-std::string message_of(Call&& call) {
-  try {
-    call();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 }  // namespace perikit::test

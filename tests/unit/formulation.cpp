@@ -5,7 +5,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/kit/messages.hpp"
+
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
@@ -62,12 +65,7 @@ class Unclassed final : public Kinematics {};
 class PointsAndPairs final : public Points, public Pairs {};
 
 std::string refusal(std::shared_ptr<const Kinematics> kinematics) {
-  try {
-    make_formulation(std::move(kinematics));
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "not refused";
+  return message_of<std::invalid_argument>([&] { make_formulation(std::move(kinematics)); });
 }
 
 int classes(const Formulation& f) { return !!f.point + !!f.bond + !!f.weighted + !!f.pairs; }

@@ -15,9 +15,11 @@
 #include "files/shared_file.hpp"
 #include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
+#include "tests/kit/messages.hpp"
 #include "tests/unit/temporary_folder.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 namespace fs = std::filesystem;
 
 namespace {
@@ -291,12 +293,7 @@ TEST_CASE("a full disk is a RunError with file and reason, and earlier frames st
   const auto handler = std::signal(SIGXFSZ, SIG_IGN);
   const rlimit small{1000, before.rlim_max};
   ::setrlimit(RLIMIT_FSIZE, &small);
-  std::string message;
-  try {
-    writer.write(2, 2, fields(2));
-  } catch (const RunError& error) {
-    message = error.what();
-  }
+  const std::string message = message_of<RunError>([&] { writer.write(2, 2, fields(2)); });
   ::setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
 

@@ -8,12 +8,17 @@
 #include "core/threads/work_steps.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "plugin/registry.hpp"
 #include "scene/scene.hpp"
 #include "setup/problem.hpp"
 #include "terms/term.hpp"
+#include "tests/kit/derivative.hpp"
+#include "tests/kit/matrices.hpp"
+#include "tests/kit/observers.hpp"
+#include "tests/kit/registry.hpp"
+#include "tests/kit/scene_text.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
@@ -57,24 +62,16 @@ class Foundation final : public Term {
   const Body& body_;
 };
 
-Registry& parts() {
-  static Registry registry;
-  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  return registry;
-}
-
 /// A plate of 9 x 7 points of E = 2, nu = 0.25.
 std::string plate(const std::string& kinematics, const std::string& further, const std::string& integrator = "evaluate") {
-  return "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 1\nlower = [0, 0]\nupper = [9, 7]\n"
-         "[family]\nhorizon_ratio = 2.515\n[kinematics]\n" +
-         kinematics + "\n[material]\ntype = \"neo_hookean\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.25\ndensity = 1\n" + further +
-         "\n[integrator]\ntype = \"" + integrator + "\"\n";
+  return SceneText{.upper = {9, 7}, .family = "horizon_ratio = 2.515", .kinematics = kinematics,
+                   .material = "type = \"neo_hookean\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.25\ndensity = 1", .further = further, .integrator = integrator};
 }
 
 std::unique_ptr<BodyProblem> with_foundation(const std::string& scene) {
   WorkSteps steps;
-  const Scene read = parse_scene(scene, "plate.toml", parts());
-  return build_problem(read, parts(), parts().integrator(*read.integrator)->traits(), steps,
+  const Scene read = parse_scene(scene, "plate.toml", all_parts());
+  return build_problem(read, all_parts(), all_parts().integrator(*read.integrator)->traits(), steps,
                        {[](const TermParts& of) { return std::make_unique<Foundation>(of); }});
 }
 
@@ -85,12 +82,6 @@ void fill(const BodyProblem& problem, FieldView u, double scale) {
     u.component(1)[p] = scale * std::cos(0.9 * x[0] - 0.3 * x[1]);
   }
 }
-
-struct Nobody final : Observer {
-  bool wants_sample(std::int64_t, double) override { return false; }
-  void step_done(const StepReport&) override {}
-  void log(std::string_view) override {}
-};
 
 double product(const BodyProblem& problem, ConstFieldView a, ConstFieldView b) {
   double sum = 0;
@@ -117,7 +108,7 @@ TEST_CASE("a further term: force = -dE/du, tangent = dF/du, the same assembled, 
       REQUIRE(problem->evaluate_forces({moved, 0}, force, &energy).ok());
       return energy;
     };
-    const double slope = (8 * (at(h, other) - at(-h, other)) - (at(2 * h, other) - at(-2 * h, other))) / (12 * h);
+    const double slope = slope_of([&](double s) { return at(s, other); }, h);
     at(0, f);
     CHECK(std::abs(slope + product(*problem, f, w)) <= 1e-8 * std::abs(slope));
     REQUIRE(problem->tangent_action({u, 0}, w, Kw).ok());
@@ -125,31 +116,21 @@ TEST_CASE("a further term: force = -dE/du, tangent = dF/du, the same assembled, 
       at(s, other);
       return -product(*problem, other, w);
     };
-    const double curvature = (8 * (along(h) - along(-h)) - (along(2 * h) - along(-2 * h))) / (12 * h);
+    const double curvature = slope_of(along, h);
     CHECK(std::abs(curvature - product(*problem, Kw, w)) <= 1e-7 * std::abs(curvature));
     BlockMatrix K;
     REQUIRE(problem->assemble_tangent({u, 0}, K).ok());
-    double worst = 0, most = 0;
-    for (std::size_t r = 0; r < K.rows(); ++r)
-      for (std::size_t a = 0; a < 2; ++a) {
-        double sum = 0;
-        for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-          for (std::size_t e = 0; e < 2; ++e)
-            sum += K.values[(b * 2 + a) * 2 + e] * w.component(static_cast<int>(e))[K.point[static_cast<std::size_t>(K.column[b])]];
-        worst = std::max(worst, std::abs(sum - Kw.component(static_cast<int>(a))[K.point[r]]));
-        most = std::max(most, std::abs(sum));
-      }
-    CHECK(worst <= 1e-12 * most);
+    CHECK(product_error(*problem, K, w, Kw) <= 1e-12);
   }
 }
 
 TEST_CASE("a further term: equilibrium under a body force, which the springs alone balance") {
   // A uniform displacement strains nothing: k V u (1 + u^2/l^2) = b V.
   const std::string scene = plate("type = \"baqp\"", "[[load]]\nset = \"all\"\nbody_force = [0.4, 0]", "newton");
-  const Scene read = parse_scene(scene, "plate.toml", parts());
+  const Scene read = parse_scene(scene, "plate.toml", all_parts());
   const std::unique_ptr<BodyProblem> problem = with_foundation(scene);
-  Nobody observer;
-  parts().integrator(*read.integrator)->run(*problem, observer);
+  Silent observer;
+  all_parts().integrator(*read.integrator)->run(*problem, observer);
   double root = 1;
   for (int k = 0; k < 50; ++k)
     root -= (stiffness * root * (1 + root * root / (length * length)) - 0.4) / (stiffness * (1 + 3 * root * root / (length * length)));

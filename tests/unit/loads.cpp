@@ -5,24 +5,20 @@
 #include <array>
 #include <cmath>
 
-#include "plugin/registry.hpp"
-#include "run/simulation.hpp"
+#include "tests/kit/registry.hpp"
+#include "tests/kit/scene_text.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
 std::unique_ptr<Simulation> plate(const std::string& set, double jitter, const std::string& load, const std::string& kinematics = "type = \"conventional\"",
                                   const std::string& further = "", double poisson_ratio = 0.25) {
-  static Registry registry;
-  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  const std::string text = fmt::format(
-      "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\nthickness = 2.0\n[body.lattice]\nspacing = 0.5\nlower = [0, 0]\nupper = [6, 5]\njitter = {}\n"
-      "[sets]\nright = \"{}\"\n[family]\nhorizon_ratio = 3.015\n[kinematics]\n{}\n"
-      "[material]\ntype = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1.0\npoisson_ratio = {}\n"
-      "[[load]]\nset = \"right\"\n{}\n{}[integrator]\ntype = \"evaluate\"\n",
-      jitter, set, kinematics, poisson_ratio, load, further);
-  return std::make_unique<Simulation>(parse_scene(text, "plate.toml", registry), registry);
+  return simulation_of(SceneText{.body = "thickness = 2.0", .spacing = 0.5, .upper = {6, 5}, .lattice = fmt::format("jitter = {}", jitter), .sets = "right = \"" + set + "\"",
+                                 .family = "horizon_ratio = 3.015", .kinematics = kinematics,
+                                 .material = fmt::format("type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1.0\npoisson_ratio = {}", poisson_ratio),
+                                 .further = fmt::format("[[load]]\nset = \"right\"\n{}\n{}", load, further)});
 }
 
 struct Resultant {

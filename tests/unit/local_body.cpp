@@ -342,12 +342,7 @@ TEST_CASE("local bodies: a part that is too large is refused, and so are more po
   const CommunicatorScope scope(first);
   const auto refused = [](const std::string& upper) {
     const Scene scene = parsed(scene_text(3, lattice(3, upper, ""), sets));
-    try {
-      build_local_body(scene, {}, 7);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    return message_of<InputError>([&] { build_local_body(scene, {}, 7); });
   };
   CHECK(refused("[100000, 10000, 10000]").find("points on a rank with a horizon of 2.015 spacings, which need") !=
         std::string::npos);

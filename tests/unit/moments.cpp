@@ -4,34 +4,13 @@
 
 #include <cmath>
 
-#include "output/history_file.hpp"
-#include "plugin/registry.hpp"
-#include "run/simulation.hpp"
+#include "tests/kit/runs.hpp"
 #include "unit/temporary_folder.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
-
-History history_of(const std::string& scene) {
-  static Registry registry;
-  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  const TemporaryFolder folder;
-  Simulation simulation(parse_scene(scene, "moments.toml", registry), registry);
-  {
-    RunRecorder recorder(simulation, folder.path, false);
-    simulation.run(recorder);
-    recorder.finish();
-  }
-  return read_history(folder.path / "history.csv");
-}
-
-double last(const History& history, const std::string& column) {
-  for (std::size_t k = 0; k < history.columns.size(); ++k)
-    if (history.columns[k] == column) return history.values[k].back();
-  FAIL("no column ", column);
-  return 0;
-}
 
 /// Columns with the moments of reactions (`held`) and of internal forces (`inner`) of all points about two places.
 std::string moments(int dimension, const std::string& set = "all") {
@@ -66,11 +45,13 @@ std::string held(const std::string& face, int dimension) { return "[[boundary]]\
 
 void check_balance(const std::string& scene, int dimension) {
   INFO(scene);
-  const History history = history_of(scene);
+  const TemporaryFolder folder;
+  const auto columns = columns_of(scene, folder.path);
+  const auto last = [&](const std::string& column) { return columns.at(column).back(); };
   for (const char* component : {"x", "y", "z"})
     for (const char* place : {"near", "far"}) {
       if (dimension == 2 && component[0] != 'z') continue;
-      const double inner = last(history, fmt::format("inner_{}_{}", component, place)), held = last(history, fmt::format("held_{}_{}", component, place));
+      const double inner = last(fmt::format("inner_{}_{}", component, place)), held = last(fmt::format("held_{}_{}", component, place));
       CHECK(std::abs(inner) > 1e-4);
       CHECK_MESSAGE(std::abs(held - inner) <= 1e-11 * std::abs(inner) + 1e-14, component, " ", place, ": ", held, " ", inner);
     }
@@ -100,8 +81,9 @@ TEST_CASE("the moment at a held face is that of the loads, about any place") {
                             "youngs_modulus = 1.0\npoisson_ratio = 0.25\n[[boundary]]\nface = \"-x\"\ndisplacement = [0, 0]\n[[load]]\nset = \"right\"\nforce = [0, 1e-9]\n"
                             "[integrator]\ntype = \"newton\"\nsteps = 1\n" +
                             moments(2, "left") + "[[load]]\nset = \"right\"\nforce = [1e-9, 0]\n";
-  const History history = history_of(scene);
+  const TemporaryFolder folder;
+  const auto columns = columns_of(scene, folder.path);
   const double x = 1.15, y = 0.4;   // the middle of the loaded points
-  CHECK(last(history, "held_z_near") == doctest::Approx(-1e-9 * ((x - 0.1) - (y - 0.2))).epsilon(1e-7));
-  CHECK(last(history, "held_z_far") == doctest::Approx(-1e-9 * ((x + 3) - (y - 7))).epsilon(1e-7));
+  CHECK(columns.at("held_z_near").back() == doctest::Approx(-1e-9 * ((x - 0.1) - (y - 0.2))).epsilon(1e-7));
+  CHECK(columns.at("held_z_far").back() == doctest::Approx(-1e-9 * ((x + 3) - (y - 7))).epsilon(1e-7));
 }

@@ -14,6 +14,7 @@
 #include "setup/body/local_body.hpp"
 #include "setup/body/several_ranks.hpp"
 #include "setup/surfaces/image_planes.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "tests/thread_ranks.hpp"
 #include "unit/cut_part.hpp"
 #include "unit/fake_catalogue.hpp"
@@ -27,37 +28,11 @@ inline std::string lattice(int dimension, const std::string& upper, const std::s
                      inside.empty() ? "" : fmt::format("inside = \"{}\"", inside), keys);
 }
 
-inline std::string scene_text(int dimension, const std::string& body, const std::string& sets,
-                              const std::string& family = "horizon_ratio = 2.015") {
-  return fmt::format(R"(format = 1
-[body]
-dimension = {}
-{}
-{}
-[sets]
-{}
-[[region]]
-set = "low"
-material = {{ type = "neo_hookean", shear_modulus = 2.0, bulk_modulus = 2.0 }}
-[[region]]
-set = "some"
-material = {{ type = "neo_hookean", shear_modulus = 3.0, bulk_modulus = 2.0 }}
-[family]
-{}
-[kinematics]
-type = "baqp"
-[material]
-type = "neo_hookean"
-shear_modulus = 1.0
-bulk_modulus = 2.0
-[integrator]
-type = "newton"
-)",
-                     dimension,
-                     dimension == 2   ? "plane = \"strain\""
-                     : dimension == 1 ? "line = \"strain\""
-                                      : "",
-                     body, sets, family);
+inline std::string scene_text(int dimension, const std::string& body, const std::string& sets, const std::string& family = "horizon_ratio = 2.015") {
+  return SceneText{.dimension = dimension, .body = body, .sets = sets, .family = family,
+                   .further = "[[region]]\nset = \"low\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 2.0, bulk_modulus = 2.0 }\n"
+                              "[[region]]\nset = \"some\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 3.0, bulk_modulus = 2.0 }\n",
+                   .integrator = "newton"};
 }
 
 /// Of each rank: expressions are evaluated by one thread at a time.
@@ -104,12 +79,7 @@ std::string message_on(int ranks, const Check& check) {
   std::mutex one;
   std::vector<std::string> said;
   on_ranks(ranks, [&](ThreadRank&) {
-    std::string what;
-    try {
-      check();
-    } catch (const InputError& error) {
-      what = error.what();
-    }
+    const std::string what = message_of<InputError>(check);
     const std::lock_guard lock(one);
     said.push_back(what);
   });

@@ -8,9 +8,11 @@
 #include "files/hdf5_file.hpp"
 #include "output/recorder.hpp"
 #include "perikit/core/errors.hpp"
+#include "tests/kit/messages.hpp"
 #include "tests/unit/temporary_folder.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
@@ -22,13 +24,8 @@ PointCloud read(const std::string& text, int dimension = 3) {
 
 /// The message behind the file's folder.
 std::string fault(const std::string& text, int dimension = 3) {
-  try {
-    read(text, dimension);
-  } catch (const InputError& error) {
-    const std::string message = error.what();
-    return message.substr(message.find("cloud.csv"));
-  }
-  return "";
+  const std::string message = message_of<InputError>([&] { read(text, dimension); });
+  return message.empty() ? "" : message.substr(message.find("cloud.csv"));
 }
 
 }  // namespace

@@ -6,8 +6,7 @@
 #include <fstream>
 #include <random>
 
-#include "plugin/registry.hpp"
-#include "run/simulation.hpp"
+#include "tests/kit/registry.hpp"
 #include "unit/part_comparison.hpp"
 #include "unit/temporary_folder.hpp"
 
@@ -54,24 +53,13 @@ class Bar {
     return text;
   }
   std::string scene(const std::string& kinematics, const std::string& boundaries, const std::string& integrator) const {
-    const auto d = cells_.size();
-    return fmt::format(
-        "format = 1\n[body]\ndimension = {}\n{}{}[sets]\nleft = \"x < 0.001\"\nright = \"x > {} - 0.001\"\n[family]\nhorizon_ratio = 2.515\n[kinematics]\n{}\n"
-        "[material]\ntype = \"linear_elastic\"\ndensity = 1.0\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.25\n{}[integrator]\n{}\n[run]\nthreads = 1\n",
-        d, d == 2 ? "plane = \"stress\"\n" : "", body_, cells_[0], kinematics, boundaries, integrator);
-  }
-  std::unique_ptr<Simulation> build(const std::string& text) const {
-    static Registry registry;
-    if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-    return std::make_unique<Simulation>(parse_scene(text, "bar.toml", registry), registry);
+    return SceneText{.dimension = static_cast<int>(cells_.size()), .space = "stress", .body = body_, .sets = fmt::format("left = \"x < 0.001\"\nright = \"x > {} - 0.001\"", cells_[0]),
+                     .family = "horizon_ratio = 2.515", .kinematics = kinematics,
+                     .material = "type = \"linear_elastic\"\ndensity = 1.0\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.25", .further = boundaries + "[run]\nthreads = 1\n",
+                     .integrator = integrator};
   }
   std::string refusal(const std::string& boundaries) const {
-    try {
-      build(scene("type = \"baqp\"", boundaries, "type = \"newton\"\nsteps = 1"));
-      return "";
-    } catch (const InputError& error) {
-      return error.what();
-    }
+    return message_of<InputError>([&] { simulation_of(scene("baqp", boundaries, "type = \"newton\"\nsteps = 1")); });
   }
   /// Of the field of uniaxial stress: energy, and the largest force on free components, over those that the field has.
   struct Stretched {
@@ -89,7 +77,7 @@ class Bar {
       boundaries += fmt::format("[[boundary]]\n{} = \"{}\"\n{}", held == "face" ? "face" : "set", held == "face" ? side : side[0] == '-' ? "left" : "right", key);
     if (held == "face")
       for (std::size_t c = 1; c < cells_.size(); ++c) boundaries += fmt::format("[[symmetry]]\naxis = \"{}\"\n", across[c]);
-    const auto simulation = build(scene(kinematics, boundaries + fmt::format("[initial]\ndisplacement = [{}]\n", field), "type = \"evaluate\""));
+    const auto simulation = simulation_of(scene(kinematics, boundaries + fmt::format("[initial]\ndisplacement = [{}]\n", field), "evaluate"));
     BodyProblem& problem = simulation->problem();
     Field force = problem.make_field();
     double energy = 0;
@@ -108,8 +96,6 @@ class Bar {
   TemporaryFolder folder_;
   std::string body_;
 };
-
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 constexpr const char* with_gradients[] = {"type = \"baqp\"", "type = \"projection\"", "type = \"bond_augmented\"", "type = \"bond_associated\"", "type = \"non_spherical\"",
                                           "type = \"sub_horizon\"", "type = \"conventional\"\nstabilization = \"silling\""};
@@ -140,12 +126,12 @@ TEST_CASE("a traction on nodes of a side keeps the bar in equilibrium, beside a 
         INFO(std::string(kinematics), ", ", cells.size(), "D, moved ", moved);
         const Bar bar(cells, moved);
         const bool flat = cells.size() == 2;
-        const auto simulation = bar.build(bar.scene(
+        const auto simulation = simulation_of(bar.scene(
             kinematics,
             std::string("[[boundary]]\nface = \"-x\"\ndisplacement = [0") + (flat ? ", \"free\"]\n[[symmetry]]\naxis = \"y\"\n" : "]\n") +
                 "[[load]]\nset = \"right\"\nface = \"+x\"\ntraction = [1.0e3" + (flat ? ", 0]\n" : "]\n") +
                 "[initial]\ndisplacement = [\"1e-3*x\"" + (flat ? ", \"-0.25e-3*y\"]\n" : "]\n"),
-            "type = \"evaluate\""));
+            "evaluate"));
         BodyProblem& problem = simulation->problem();
         Field force = problem.make_field(), load = problem.make_field();
         double energy = 0, largest = 0, work = 0;
@@ -165,24 +151,24 @@ TEST_CASE("a traction on nodes of a side keeps the bar in equilibrium, beside a 
 TEST_CASE("where a side lies is found by volumes, and said") {
   const Bar bar({10, 5}, false);
   const std::string faces = "[[boundary]]\nface = \"-x\"\ndisplacement = [0, 0]\n[[symmetry]]\naxis = \"y\"\n";
-  const auto on_side = bar.build(bar.scene("type = \"baqp\"", faces, "type = \"newton\"\nsteps = 1"));
+  const auto on_side = simulation_of(bar.scene("type = \"baqp\"", faces, "type = \"newton\"\nsteps = 1"));
   REQUIRE(on_side->problem().notes().size() == 2);
   CHECK(on_side->problem().notes()[0] == "-x at 0, by the volumes of its points, which are those of half cells; its points lie on it");
   const Bar centroids({10, 5}, false, true);
-  const auto beyond = centroids.build(centroids.scene("type = \"baqp\"", faces, "type = \"newton\"\nsteps = 1"));
+  const auto beyond = simulation_of(centroids.scene("type = \"baqp\"", faces, "type = \"newton\"\nsteps = 1"));
   CHECK(beyond->problem().notes()[0] == "-x at -0.5, by the volumes of its points, half a cell beyond them");
   const Bar box({10, 5}, true);
-  CHECK(box.build(box.scene("type = \"baqp\"", faces, "type = \"newton\"\nsteps = 1"))->problem().notes()[0] == "-x at 0, that of the box of the points' cells; its points lie on it");
+  CHECK(simulation_of(box.scene("type = \"baqp\"", faces, "type = \"newton\"\nsteps = 1"))->problem().notes()[0] == "-x at 0, that of the box of the points' cells; its points lie on it");
 }
 
 TEST_CASE("points on or near sides that cannot be right are refused at once") {
   const Bar whole({10}, false, true), half({10}, false);
   CHECK(half.refusal("[[boundary]]\nface = \"-x\"\nat = 0\ndisplacement = [0]\n").empty());
   CHECK(half.refusal("[[symmetry]]\naxis = \"x\"\nat = 0\n[[boundary]]\nset = \"right\"\ndisplacement = [0]\n").empty());
-  CHECK(has(whole.refusal("[[boundary]]\nface = \"-x\"\nat = 0\ndisplacement = [0]\n"), "found points on the side, at 0, that have 1 times the volume of those behind them"));
-  CHECK(has(whole.refusal("[[symmetry]]\naxis = \"x\"\nat = 0\n"), "found points on the side, at 0, that have 1 times the volume of those behind them"));
-  CHECK(has(whole.refusal("[[boundary]]\nface = \"-x\"\nat = -0.01\ndisplacement = [0]\n"), "found a side at -0.01, with a point 0.01 spacings from it"));
-  CHECK(has(half.refusal("[[periodic]]\naxis = \"x\"\nlower = 0\nupper = 10\n"), "found points on both sides, at 0 and 10, which are the same places"));
+  CHECK(contains(whole.refusal("[[boundary]]\nface = \"-x\"\nat = 0\ndisplacement = [0]\n"), "found points on the side, at 0, that have 1 times the volume of those behind them"));
+  CHECK(contains(whole.refusal("[[symmetry]]\naxis = \"x\"\nat = 0\n"), "found points on the side, at 0, that have 1 times the volume of those behind them"));
+  CHECK(contains(whole.refusal("[[boundary]]\nface = \"-x\"\nat = -0.01\ndisplacement = [0]\n"), "found a side at -0.01, with a point 0.01 spacings from it"));
+  CHECK(contains(half.refusal("[[periodic]]\naxis = \"x\"\nlower = 0\nupper = 10\n"), "found points on both sides, at 0 and 10, which are the same places"));
 }
 
 TEST_CASE("curved surfaces with points on them: a ring between two held surfaces stores what its affine motion has") {
@@ -197,15 +183,11 @@ TEST_CASE("curved surfaces with points on them: a ring between two held surfaces
         csv << fmt::format("{},{},{}\n", r * std::cos(angle), r * std::sin(angle), M_PI * (outer * outer - inner * inner) / around);
       }
   }
-  static Registry registry;
-  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  const std::string text = fmt::format(
-      "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.points]\nfile = \"{}\"\n[family]\nhorizon_ratio = 2.515\n[kinematics]\ntype = \"baqp\"\n"
-      "[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.0\n[[boundary]]\nsurface = \"1 - sqrt(x^2 + y^2)\"\ndisplacement = [\"0.01*x\", 0]\n"
-      "[[boundary]]\nsurface = \"sqrt(x^2 + y^2) - 2\"\ndisplacement = [\"0.01*x\", 0]\n[initial]\ndisplacement = [\"0.01*x\", 0]\n[integrator]\ntype = \"evaluate\"\n",
-      (folder.path / "ring.csv").string());
-  Simulation simulation(parse_scene(text, "ring.toml", registry), registry);
-  BodyProblem& problem = simulation.problem();
+  const std::string held = "[[boundary]]\nsurface = \"1 - sqrt(x^2 + y^2)\"\ndisplacement = [\"0.01*x\", 0]\n[[boundary]]\nsurface = \"sqrt(x^2 + y^2) - 2\"\ndisplacement = [\"0.01*x\", 0]\n";
+  const auto simulation = simulation_of(SceneText{.body = fmt::format("[body.points]\nfile = \"{}\"", (folder.path / "ring.csv").string()), .family = "horizon_ratio = 2.515",
+                                                  .material = "type = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.0",
+                                                  .further = held + "[initial]\ndisplacement = [\"0.01*x\", 0]"});
+  BodyProblem& problem = simulation->problem();
   Field force = problem.make_field();
   double energy = 0;
   REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0, 0}, force, &energy).ok());

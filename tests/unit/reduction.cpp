@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "plugin/registry.hpp"
-#include "run/simulation.hpp"
+#include "tests/kit/registry.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;
@@ -16,17 +16,9 @@ namespace {
 
 /// A plate of 6 x 5 points at (k + 1/2) 0.5 with one record of its displacement.
 std::unique_ptr<Simulation> plate(const std::string& set, const std::string& record, double jitter = 0) {
-  static Registry registry;
-  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  const std::string text = fmt::format(
-      "format = 1\n[constants]\nright = 3.0\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.5\nlower = "
-      "[0, 0]\nupper = [3, 2.5]\njitter = {}\n"
-      "[sets]\nsome = \"{}\"\n[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = \"conventional\"\n"
-      "[material]\ntype = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.25\n[integrator]\ntype = "
-      "\"evaluate\"\n"
-      "[output]\nhistory = [{{ name = \"u\", set = \"some\", quantity = \"displacement\", component = \"x\", {} }}]\n",
-      jitter, set, record);
-  return std::make_unique<Simulation>(parse_scene(text, "plate.toml", registry), registry);
+  return simulation_of(SceneText{.constants = "right = 3.0", .spacing = 0.5, .upper = {3, 2.5}, .lattice = fmt::format("jitter = {}", jitter), .sets = "some = \"" + set + "\"",
+                                 .kinematics = "conventional", .material = "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.25",
+                                 .further = fmt::format("[output]\nhistory = [{{ name = \"u\", set = \"some\", quantity = \"displacement\", component = \"x\", {} }}]", record)});
 }
 
 /// What the record gives for u_x = value(x, y) at t.

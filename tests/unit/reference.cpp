@@ -9,7 +9,10 @@
 #include <numbers>
 #include <random>
 
+#include "tests/kit/derivative.hpp"
+
 using namespace perikit::reference;
+using perikit::test::slope_of;
 
 namespace {
 
@@ -43,14 +46,6 @@ Law saint_venant_kirchhoff(double lambda, double mu) {
 }
 
 constexpr double spacing = 0.1;
-
-/// f'(0) by fourth-order central differences: exact to rounding for polynomials up to degree 4, such as the energy of Saint
-/// Venant-Kirchhoff along a line of displacements.
-template <class Function>
-auto slope(const Function& f, double step) {
-  using Value = decltype(f(step));
-  return Value((8 * (f(step) - f(-step)) - (f(2 * step) - f(-2 * step))) / (12 * step));
-}
 
 double relative(double a, double b) {
   return std::abs(a - b) / std::abs(b);
@@ -186,14 +181,14 @@ TEST_CASE("reference: force and tangent are derivatives, momenta are conserved, 
         const Vector u = displacement(cloud), v = displacement(cloud, 0.5) - 2 * u;
         const Vector f = force(op, law, u);
         const double step = kinematics.name == "selective" ? 3e-5 : 1e-3;  // the map is no polynomial
-        const double by_difference = -slope([&](double t) { return energy(op, law, u + t * v); }, step);
+        const double by_difference = -slope_of([&](double t) { return energy(op, law, u + t * v); }, step);
         CHECK(std::abs(f.dot(v) - by_difference) < 1e-8 * f.norm() * v.norm());
         const auto [total, moment] = resultants(cloud, u, f);
         CHECK(total.norm() < 1e-12 * f.norm());
         CHECK(moment.norm() < 1e-12 * f.norm());
         if (d < 3) {
           const Matrix K = stiffness(op, law, u);
-          const Vector Kv = K * v, by_force = -slope([&](double t) { return force(op, law, u + t * v); }, step);
+          const Vector Kv = K * v, by_force = -slope_of([&](double t) { return force(op, law, u + t * v); }, step);
           CHECK((Kv - by_force).norm() < 1e-8 * Kv.norm());
           CHECK((K - K.transpose()).norm() < 1e-12 * K.norm());
         }
@@ -294,7 +289,7 @@ TEST_CASE("reference: pair laws and penalties are variational, balanced and blin
         CAPTURE(name);
         const auto E = [&](double t) { return pair_energy(cloud, name, elasticity, u + t * v); };
         const Vector f = pair_force(cloud, name, elasticity, u);
-        CHECK(std::abs(f.dot(v) + slope(E, 1e-4)) < 1e-8 * f.norm() * v.norm());
+        CHECK(std::abs(f.dot(v) + slope_of(E, 1e-4)) < 1e-8 * f.norm() * v.norm());
         const auto [total, moment] = resultants(cloud, u, f);
         CHECK(total.norm() < 1e-12 * f.norm());
         CHECK(moment.norm() < 1e-12 * f.norm());

@@ -14,8 +14,10 @@
 #include "perikit/core/errors.hpp"
 #include "perikit/influence.hpp"
 #include "plugin/manifest.hpp"
+#include "tests/kit/messages.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 namespace fs = std::filesystem;
 
 namespace {
@@ -40,19 +42,10 @@ struct Folder {
   static inline int count = 0;
 };
 
-std::string error_of(auto&& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 /// Opening `file` must fail with the file and `reason` in the message, and leave the registry as it was.
 void check_refused(const fs::path& file, const std::string& reason) {
   Registry registry;
-  const std::string message = error_of([&] { registry.open(file); });
+  const std::string message = message_of<InputError>([&] { registry.open(file); });
   CHECK_MESSAGE(message.find(reason) != std::string::npos, message);
   CHECK_MESSAGE(message.find(file.filename().string()) != std::string::npos, message);
   REQUIRE(registry.refused().size() == 1);
@@ -169,7 +162,7 @@ TEST_CASE("without a process to try it in, a library is refused") {
   if (child == 0) {  // the limit cannot be undone, and does not bind root
     const rlimit none{0, 0};
     if (setrlimit(RLIMIT_NPROC, &none) != 0 || (getuid() == 0 && setuid(65534) != 0)) _exit(2);
-    _exit(error_of([&] { Registry().open(library); }).find("no process to try it in") != std::string::npos ? 0 : 1);
+    _exit(message_of<InputError>([&] { Registry().open(library); }).find("no process to try it in") != std::string::npos ? 0 : 1);
   }
   int status = -1;
   REQUIRE(waitpid(child, &status, 0) == child);
@@ -192,7 +185,7 @@ TEST_CASE("bad descriptions are refused with part and reason") {
 TEST_CASE("a duplicate is refused with both files named, and whole") {
   Registry registry;
   registry.open(built("good"));
-  const std::string message = error_of([&] { registry.open(built("duplicate")); });
+  const std::string message = message_of<InputError>([&] { registry.open(built("duplicate")); });
   CHECK(message.find("influence 'sound': duplicate") != std::string::npos);
   CHECK(message.find("good.so") != std::string::npos);
   CHECK(message.find("duplicate.so") != std::string::npos);
@@ -291,7 +284,7 @@ TEST_CASE("a scan reads manifests alone; a library that changed since then is tr
     Registry registry;
     registry.add_folder(folder.path);
     folder.copy("crashing_constructor", "good.so");
-    CHECK(error_of([&] { registry.describe(Kind::influence, "sound"); }).find("kills the process") != std::string::npos);
+    CHECK(message_of<InputError>([&] { registry.describe(Kind::influence, "sound"); }).find("kills the process") != std::string::npos);
     CHECK(registry.names(Kind::influence).empty());
   }
   SUBCASE("into one of the same size with other bytes: damaged, and refused") {
@@ -300,7 +293,7 @@ TEST_CASE("a scan reads manifests alone; a library that changed since then is tr
     folder.write("good.so", other);
     registry.add_folder(folder.path);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"promised", "sound"});
-    const std::string error = error_of([&] { registry.describe(Kind::influence, "sound"); });
+    const std::string error = message_of<InputError>([&] { registry.describe(Kind::influence, "sound"); });
     CHECK_MESSAGE(error.find("its bytes are not those that good.parts describes") != std::string::npos, error);
     CHECK(registry.names(Kind::influence).empty());
     REQUIRE(registry.refused().size() == 1);
@@ -310,7 +303,7 @@ TEST_CASE("a scan reads manifests alone; a library that changed since then is tr
     registry.add_folder(folder.path);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"promised", "sound"});
     folder.write("good.so", other + " ");
-    CHECK(error_of([&] { registry.describe(Kind::influence, "promised"); }).find("found the unknown influence 'promised'") == 0);
+    CHECK(message_of<InputError>([&] { registry.describe(Kind::influence, "promised"); }).find("found the unknown influence 'promised'") == 0);
     CHECK(registry.names(Kind::influence) == std::vector<std::string>{"sound"});
     CHECK(registry.refused().empty());
   }
@@ -343,7 +336,7 @@ TEST_CASE("a manifest that names what the library does not register: refused whe
   write_manifest(folder.copy("good", "good.so"), {{Kind::influence, "promised", ""}, {Kind::influence, "sound", ""}});
   Registry registry;
   registry.add_folder(folder.path);
-  CHECK(error_of([&] { registry.describe(Kind::influence, "sound"); }).find("names 'promised'") != std::string::npos);
+  CHECK(message_of<InputError>([&] { registry.describe(Kind::influence, "sound"); }).find("names 'promised'") != std::string::npos);
   CHECK(registry.names(Kind::influence).empty());
 }
 
@@ -367,17 +360,17 @@ TEST_CASE("an unknown name gets the nearest, the known ones and the refused libr
   folder.copy("good", "good.so");
   Registry registry;
   registry.add_folder(folder.path);
-  const std::string message = error_of([&] { registry.describe(Kind::influence, "sund"); });
+  const std::string message = message_of<InputError>([&] { registry.describe(Kind::influence, "sund"); });
   CHECK(message.find("found the unknown influence 'sund'; allowed: sound; did you mean 'sound'?; refused libraries") == 0);
   CHECK(message.find("text.so (not a shared library (ELF magic missing))") != std::string::npos);
-  CHECK(error_of([&] { Registry().library_of(Kind::material, "steel"); }) ==
+  CHECK(message_of<InputError>([&] { Registry().library_of(Kind::material, "steel"); }) ==
         "found the unknown material 'steel'; allowed: none, no library brings any; parts in other folders: --plugin-path, PERIKIT_PLUGIN_PATH");
 }
 
 TEST_CASE("a factory that throws or returns null names part and library") {
   Registry registry;
   registry.open(built("bad_factories"));
-  const auto create = [&](const std::string& type) { return error_of([&] { registry.influence(influence_values(type)); }); };
+  const auto create = [&](const std::string& type) { return message_of<InputError>([&] { registry.influence(influence_values(type)); }); };
   const std::string place = "scene.toml:4:1: family.influence: influence ";
   CHECK(create("throws").find(place + "'throws' of ") == 0);
   CHECK(create("throws").find("bad_factories.so cannot be made: table not found") != std::string::npos);
@@ -394,5 +387,5 @@ TEST_CASE("search path: given folders, the environment, the folder beside the li
   CHECK(path[1] == "/one");
   CHECK(path[2] == "/two");
   if (fs::is_directory(PERIKIT_PLUGIN_FOLDER)) CHECK(path.back() == fs::weakly_canonical(PERIKIT_PLUGIN_FOLDER));
-  CHECK(error_of([] { Registry().add_folder("/no/such/folder"); }).find("/no/such/folder: this plugin folder cannot be read") == 0);
+  CHECK(message_of<InputError>([] { Registry().add_folder("/no/such/folder"); }).find("/no/such/folder: this plugin folder cannot be read") == 0);
 }

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "setup/body/body.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "unit/fake_catalogue.hpp"
 
 using namespace perikit;
@@ -28,29 +29,10 @@ class Isotropic final : public Material {
 };
 
 double estimate(int dimension, const char* space) {
-  constexpr const char *lower[] = {"[0]", "[0, 0]", "[0, 0, 0]"}, *upper[] = {"[1]", "[1, 1]", "[1, 1, 1]"};
   FakeCatalogue parts;
-  const Scene scene = parse_scene(fmt::format(R"(format = 1
-[body]
-dimension = {}
-{}
-[body.lattice]
-spacing = {}
-lower = {}
-upper = {}
-[family]
-horizon_ratio = {}
-[kinematics]
-type = "baqp"
-[material]
-type = "neo_hookean"
-shear_modulus = 1.0
-bulk_modulus = 2.0
-[integrator]
-type = "newton"
-)",
-                                              dimension, space, spacing, lower[dimension - 1], upper[dimension - 1], ratio),
-                                  "bar.toml", parts);
+  const std::string text = SceneText{.dimension = dimension, .space = space, .spacing = spacing, .upper = std::vector<double>(static_cast<std::size_t>(dimension), 1.0),
+                                     .family = fmt::format("horizon_ratio = {}", ratio), .integrator = "newton"};
+  const Scene scene = parse_scene(text, "bar.toml", parts);
   const Body body = build_body(scene);
   std::vector<MaterialRecord> records(1);
   records[0].material = std::make_shared<Isotropic>();
@@ -70,9 +52,9 @@ TEST_CASE("stable step: the bond-based estimate takes the modulus that the space
   const double delta = ratio * spacing, pi = std::numbers::pi, E = mu * (3 * lambda + 2 * mu) / (lambda + mu),
                nu = lambda / (2 * (lambda + mu));
   const double bar = 2 / (delta * delta), plate = 12 / (pi * std::pow(delta, 3)), block = 18 / (pi * std::pow(delta, 4));
-  CHECK(estimate(1, "line = \"strain\"") == doctest::Approx(expected(1, bar * (lambda + 2 * mu))).epsilon(1e-12));
-  CHECK(estimate(1, "line = \"stress\"") == doctest::Approx(expected(1, bar * E)).epsilon(1e-12));
-  CHECK(estimate(2, "plane = \"strain\"") == doctest::Approx(expected(2, plate * (lambda + mu))).epsilon(1e-12));
-  CHECK(estimate(2, "plane = \"stress\"") == doctest::Approx(expected(2, plate * E / (2 * (1 - nu)))).epsilon(1e-12));
+  CHECK(estimate(1, "strain") == doctest::Approx(expected(1, bar * (lambda + 2 * mu))).epsilon(1e-12));
+  CHECK(estimate(1, "stress") == doctest::Approx(expected(1, bar * E)).epsilon(1e-12));
+  CHECK(estimate(2, "strain") == doctest::Approx(expected(2, plate * (lambda + mu))).epsilon(1e-12));
+  CHECK(estimate(2, "stress") == doctest::Approx(expected(2, plate * E / (2 * (1 - nu)))).epsilon(1e-12));
   CHECK(estimate(3, "") == doctest::Approx(expected(3, block * (lambda + 2 * mu / 3))).epsilon(1e-12));
 }

@@ -9,8 +9,9 @@
 #include <fstream>
 #include <iterator>
 
-#include "plugin/registry.hpp"
 #include "study/axes.hpp"
+#include "tests/kit/registry.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "unit/fake_catalogue.hpp"
 #include "unit/temporary_folder.hpp"
 
@@ -20,28 +21,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const std::string scene_text = R"(format = 1
-[constants]
-k = 2.0
-[body]
-dimension = 1
-[body.lattice]
-spacing = 1.0
-lower = [0]
-upper = [4]
-[family]
-horizon_ratio = 2
-[kinematics]
-type = "conventional"
-[material]
-type = "saint_venant_kirchhoff"
-density = 1.0
-youngs_modulus = 1.0
-poisson_ratio = 0.25
-[integrator]
-type = "verlet"
-end_time = 1.0
-)";
+const std::string scene_text = SceneText{.dimension = 1, .space = "", .constants = "k = 2.0", .upper = {4}, .family = "horizon_ratio = 2", .kinematics = "conventional",
+                                         .material = "type = \"saint_venant_kirchhoff\"\ndensity = 1.0\nyoungs_modulus = 1.0\npoisson_ratio = 0.25",
+                                         .integrator = "type = \"verlet\"\nend_time = 1.0"};
 
 const std::string study_text = R"(format = 1
 title = "A study"
@@ -374,8 +356,7 @@ TEST_CASE("a study with a level tells it in its table, and refuses one that a lo
 
 TEST_CASE("a run in a process of its own: its measures come back, its end is told") {
   StudyFolder folder;
-  Registry registry;
-  registry.add_folder(PERIKIT_PLUGIN_FOLDER);
+  Registry& registry = all_parts();
   const Scene scene = read_scene(folder.path / "scene.toml", registry, {{"integrator.time_step=0.1", "run.threads=1"}, false});
   const RunOutcome outcome = run_in_child(scene, registry, folder.path / "run");
   CHECK_MESSAGE(outcome.status == "done", outcome.reason);
@@ -392,8 +373,7 @@ TEST_CASE("a run in a process of its own: its measures come back, its end is tol
 
 TEST_CASE("zero_energy.toml: the conventional gradient does not see the shortest wave, bond-level ones do") {
   const TemporaryFolder folder;
-  Registry registry;
-  registry.add_folder(PERIKIT_PLUGIN_FOLDER);
+  Registry& registry = all_parts();
   const Study study = read_study(fs::path(PERIKIT_SOURCE_FOLDER) / "configs/studies/zero_energy.toml", registry);
   const auto run = [&](const Scene& scene, const fs::path& own) { return run_here(scene, registry, own); };
   const StudyTable table = run_study(study, registry, {}, folder.path, run, silent);

@@ -4,38 +4,29 @@
 
 #include <fstream>
 
-#include "plugin/registry.hpp"
-#include "run/simulation.hpp"
+#include "tests/kit/messages.hpp"
+#include "tests/kit/registry.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "unit/temporary_folder.hpp"
 
 using namespace perikit;
+using namespace perikit::test;
 
 namespace {
 
-std::string scene_of(int dimension, const std::string& body, const std::string& kinematics = "type = \"baqp\"", const std::string& further = "") {
-  return fmt::format(
-      "format = 1\n[body]\ndimension = {}\n{}{}[family]\nhorizon_ratio = 2.015\n[kinematics]\n{}\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\n"
-      "poisson_ratio = 0.25\n{}[integrator]\ntype = \"evaluate\"\n",
-      dimension, dimension == 2 ? "plane = \"stress\"\n" : "", body, kinematics, further);
+std::string scene_of(int dimension, const std::string& body, const std::string& kinematics = "baqp", const std::string& further = "") {
+  return SceneText{.dimension = dimension, .space = "stress", .body = body, .kinematics = kinematics, .material = "type = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.25",
+                   .further = further};
 }
 
 /// What is said against a body; empty: nothing.
-std::string refusal(int dimension, const std::string& body, const std::string& kinematics = "type = \"baqp\"", const std::string& further = "") {
-  static Registry registry;
-  if (registry.names(Kind::kinematics).empty()) registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-  try {
-    Simulation(parse_scene(scene_of(dimension, body, kinematics, further), "thin.toml", registry), registry);
-    return "";
-  } catch (const InputError& error) {
-    return error.what();
-  }
+std::string refusal(int dimension, const std::string& body, const std::string& kinematics = "baqp", const std::string& further = "") {
+  return message_of<InputError>([&] { simulation_of(scene_of(dimension, body, kinematics, further), "thin.toml"); });
 }
 
 std::string lattice(const std::string& upper, const std::string& further = "") {
   return fmt::format("[body.lattice]\nspacing = 1.0\nlower = [0, 0{}]\nupper = [{}]\n{}", std::count(upper.begin(), upper.end(), ',') == 2 ? ", 0" : "", upper, further);
 }
-
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 constexpr const char* of_all_kinds[] = {"type = \"baqp\"", "type = \"projection\"", "type = \"conventional\"\nstabilization = \"silling\"", "type = \"sub_horizon\"",
                                         "type = \"non_spherical\"", "type = \"selective\"\nbase = { type = \"baqp\" }", "type = \"bond_based\"", "type = \"ordinary\""};
@@ -45,19 +36,19 @@ constexpr const char* of_all_kinds[] = {"type = \"baqp\"", "type = \"projection\
 TEST_CASE("bodies one point thick are refused, and the remedy is named") {
   for (const char* kinematics : of_all_kinds) {
     INFO(kinematics);
-    if (has(kinematics, "selective")) continue;  // not in plane stress
+    if (contains(kinematics, "selective")) continue;  // not in plane stress
     const std::string line = refusal(2, lattice("6, 1"), kinematics);
-    CHECK(has(line, "thin.toml:2:1: body.dimension: found a body in 2 dimensions that is one point thick along y"));
-    CHECK(has(line, "allowed: dimension = 1, area = 1, or several points across"));
+    CHECK(contains(line, "thin.toml:2:1: body.dimension: found a body in 2 dimensions that is one point thick along y"));
+    CHECK(contains(line, "allowed: dimension = 1, area = 1, or several points across"));
   }
   for (const char* kinematics : of_all_kinds) {
     INFO(kinematics);
     const std::string plate = refusal(3, lattice("6, 4, 1"), kinematics);
-    CHECK(has(plate, "found a body in 3 dimensions that is one point thick along z"));
-    CHECK(has(plate, "allowed: dimension = 2, plane = \"stress\", thickness = 1, or several points across"));
+    CHECK(contains(plate, "found a body in 3 dimensions that is one point thick along z"));
+    CHECK(contains(plate, "allowed: dimension = 2, plane = \"stress\", thickness = 1, or several points across"));
   }
-  CHECK(has(refusal(3, lattice("6, 1, 1")), "allowed: dimension = 1, area = 1"));
-  CHECK(has(refusal(2, lattice("2, 1")), "one point thick along y"));
+  CHECK(contains(refusal(3, lattice("6, 1, 1")), "allowed: dimension = 1, area = 1"));
+  CHECK(contains(refusal(2, lattice("2, 1")), "one point thick along y"));
 }
 
 TEST_CASE("clouds one point thick and pieces that are, beside thick ones, are refused") {
@@ -69,20 +60,17 @@ TEST_CASE("clouds one point thick and pieces that are, beside thick ones, are re
     return csv;
   }();
   const std::string cloud = refusal(3, fmt::format("[body.points]\nfile = \"{}\"\n", (folder.path / "plate.csv").string()));
-  CHECK(has(cloud, "one point thick along ("));
-  CHECK(has(cloud, "dimension = 2, plane = \"stress\", thickness = ..."));
+  CHECK(contains(cloud, "one point thick along ("));
+  CHECK(contains(cloud, "dimension = 2, plane = \"stress\", thickness = ..."));
   const std::string piece = refusal(2, lattice("12, 12", "inside = \"y < 4 || y > 11\"\n"));
-  CHECK(has(piece, "found a piece of the body, at (0.5, 11.5, 0), in 2 dimensions that is one point thick along y (12 such points)"));
+  CHECK(contains(piece, "found a piece of the body, at (0.5, 11.5, 0), in 2 dimensions that is one point thick along y (12 such points)"));
 }
 
 TEST_CASE("chips beside a body are warned of") {
   const std::string chip = "inside = \"y < 18 || (y > 20 && x < 2)\"\n";   // two points of 380
-  Registry registry;
-  registry.add_folder(PERIKIT_PLUGIN_FOLDER);
   CHECK(refusal(2, lattice("21, 21", chip)).empty());
-  Simulation simulation(parse_scene(scene_of(2, lattice("21, 21", chip)), "chip.toml", registry), registry);
-  CHECK(has(simulation.summary(), "warning       2 points in pieces that are one point thick, 0.0053 of the volume of the body, the first one at (0.5, 20.5, 0)"));
-  CHECK(has(refusal(2, lattice("21, 21", "inside = \"y < 18 || (y > 20 && x < 6)\"\n")), "found a piece of the body, at (0.5, 20.5, 0)"));
+  CHECK(contains(simulation_of(scene_of(2, lattice("21, 21", chip)))->summary(), "warning       2 points in pieces that are one point thick, 0.0053 of the volume of the body, the first one at (0.5, 20.5, 0)"));
+  CHECK(contains(refusal(2, lattice("21, 21", "inside = \"y < 18 || (y > 20 && x < 6)\"\n")), "found a piece of the body, at (0.5, 20.5, 0)"));
 }
 
 TEST_CASE("bodies that are thick somewhere, and single points, are not refused") {

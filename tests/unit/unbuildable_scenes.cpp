@@ -5,7 +5,8 @@
 
 #include <fstream>
 
-#include "run/simulation.hpp"
+#include "tests/kit/messages.hpp"
+#include "tests/kit/registry.hpp"
 #include "unit/scene_draft.hpp"
 #include "unit/temporary_folder.hpp"
 
@@ -181,21 +182,12 @@ const Fault faults[]{
      1003, "output.history.0.quantity", "found \"cauchy\"", "displacement"},
 };
 
-class Bench {
- public:
-  Bench() { registry.add_folder(PERIKIT_PLUGIN_FOLDER); }
-  /// What refuses the scene, "" where nothing does.
-  std::string refusal(const std::string& text) {
-    try {
-      Simulation simulation(parse_scene(text, folder.path / "scene.toml", registry), registry);
-      simulation.summary();
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  }
-  Registry registry;
+struct Bench {
   TemporaryFolder folder;
+  /// What refuses the scene, "" where nothing does.
+  std::string refusal(const std::string& text) const {
+    return message_of<InputError>([&] { simulation_of(text, folder.path / "scene.toml")->summary(); });
+  }
 };
 
 /// The plate with its points from cloud.csv.
@@ -208,10 +200,6 @@ std::string cloud() {
   std::string csv = "x,y,volume\n";
   for (int k = 0; k < 24; ++k) csv += fmt::format("{},{},1\n", k % 6 + 0.5, k / 6 + 0.5);
   return csv;
-}
-
-bool has(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 }  // namespace
@@ -232,10 +220,10 @@ TEST_CASE("scenes that cannot be built are refused with file, line, key, what wa
     const std::size_t at = message.find(": " + key);
     CHECK_MESSAGE(at != std::string::npos, "key ", key);
     const std::string found = fault.found, first = found.substr(0, found.find('|')), second = found.substr(found.find('|') + 1);
-    CHECK_MESSAGE((has(message, first) || has(message, second)), "found: ", found);
+    CHECK_MESSAGE((contains(message, first) || contains(message, second)), "found: ", found);
     const std::size_t allowed = message.find("; allowed: ");
-    CHECK_MESSAGE((allowed != std::string::npos && has(message.substr(allowed), fault.allowed)), "allowed: ", fault.allowed);
-    CHECK(has(message, "found "));
+    CHECK_MESSAGE((allowed != std::string::npos && contains(message.substr(allowed), fault.allowed)), "allowed: ", fault.allowed);
+    CHECK(contains(message, "found "));
   }
 }
 
@@ -248,7 +236,7 @@ TEST_CASE("sides of points from a file are found by volumes, and must be placed 
   std::string uneven = cloud();
   uneven.replace(uneven.find("0.5,1.5,1"), 9, "0.7,1.5,1");
   std::ofstream(bench.folder.path / "cloud.csv") << uneven;
-  CHECK(has(bench.refusal(text), "boundary.0.at: found nothing for points from a file, whose outermost lies at 0.5 and is no part of a layer; allowed: the coordinate of the side"));
+  CHECK(contains(bench.refusal(text), "boundary.0.at: found nothing for points from a file, whose outermost lies at 0.5 and is no part of a layer; allowed: the coordinate of the side"));
   text.replace(text.find("face = "), 0, "at = 0.0\n");
   CHECK(bench.refusal(text).empty());
 }
@@ -281,25 +269,25 @@ TEST_CASE("files that hold no body are refused with file, line, column and what 
                {"x,y,volume", "x,z,volume", "cloud.csv:1:1: found no column 'y'"}};
   for (const auto& c : cases) {
     const std::string message = changed(c.from, c.to);
-    CHECK_MESSAGE(has(message, c.message), c.message, " is not in: ", message);
+    CHECK_MESSAGE(contains(message, c.message), c.message, " is not in: ", message);
   }
-  CHECK(has(refusal("x,y,volume\n"), "cloud.csv: found no points behind the header line; allowed: one or more"));
-  CHECK(has(refusal(""), "cloud.csv: found no header line; allowed: x,y,volume"));
+  CHECK(contains(refusal("x,y,volume\n"), "cloud.csv: found no points behind the header line; allowed: one or more"));
+  CHECK(contains(refusal(""), "cloud.csv: found no header line; allowed: x,y,volume"));
   // Areas of a plate that is thin: a hundred times the volumes that there is room for.
   {
     SceneDraft thin(text);
     thin.set("body", "thickness", "0.01");
     std::ofstream(bench.folder.path / "cloud.csv") << good;
     const std::string message = bench.refusal(thin.text());
-    CHECK_MESSAGE(has(message, "body.points.file: found volumes that add up to 24 m^3, 100 times the 0.24 m^3 that the points have room for: their box is 6 m long in x, 4 m in y, "
+    CHECK_MESSAGE(contains(message, "body.points.file: found volumes that add up to 24 m^3, 100 times the 0.24 m^3 that the points have room for: their box is 6 m long in x, 4 m in y, "
                                "with a thickness of 0.01 m"),
                   message);
-    CHECK_MESSAGE(has(message, "allowed: volumes in m^3, areas times the thickness"), message);
+    CHECK_MESSAGE(contains(message, "allowed: volumes in m^3, areas times the thickness"), message);
   }
   // A horizon that no bond fits into.
   SceneDraft draft(text);
   draft.set("family", "horizon_ratio", "0.4", "horizon");
   std::ofstream(bench.folder.path / "cloud.csv") << good;
   const std::string message = bench.refusal(draft.text());
-  CHECK_MESSAGE(has(message, "family.horizon: found 0.4; allowed: at least the mean spacing of the points, 1"), message);
+  CHECK_MESSAGE(contains(message, "family.horizon: found 0.4; allowed: at least the mean spacing of the points, 1"), message);
 }

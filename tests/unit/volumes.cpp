@@ -11,6 +11,7 @@
 
 #include "body/voronoi/voronoi.hpp"
 #include "setup/body/body.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "unit/fake_catalogue.hpp"
 #include "unit/temporary_folder.hpp"
 
@@ -21,26 +22,8 @@ namespace {
 
 Body body(const std::string& points, const std::string& family, const std::filesystem::path& folder = {}) {
   FakeCatalogue parts;
-  return build_body(parse_scene(fmt::format(R"(format = 1
-[body]
-dimension = 2
-plane = "strain"
-thickness = 2.0
-{}
-[family]
-horizon_ratio = 3
-{}
-[kinematics]
-type = "baqp"
-[material]
-type = "neo_hookean"
-shear_modulus = 1.0
-bulk_modulus = 2.0
-[integrator]
-type = "newton"
-)",
-                                            points, family),
-                                folder / "disc.toml", parts));
+  const std::string text = SceneText{.body = "thickness = 2.0\n" + points, .family = "horizon_ratio = 3\n" + family, .integrator = "newton"};
+  return build_body(parse_scene(text, folder / "disc.toml", parts));
 }
 
 double total(const Body& body) {
@@ -50,12 +33,7 @@ double total(const Body& body) {
 }
 
 std::string refusal(const std::string& points, const std::string& family) {
-  try {
-    body(points, family);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return message_of<InputError>([&] { body(points, family); });
 }
 
 const std::string disc = R"([body.lattice]

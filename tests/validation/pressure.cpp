@@ -106,8 +106,8 @@ TEST_CASE("a following pressure holds a uniform stress in equilibrium beside hel
       BodyProblem& problem = simulation->problem();
       Field force = problem.make_field(), external = problem.make_field();
       const ConstFieldView u = problem.state().displacement();
-      REQUIRE(problem.evaluate_forces(u, force, nullptr).ok());
-      REQUIRE(problem.external_forces(u, 1.0, external).ok());
+      REQUIRE(problem.evaluate_forces({u, 0}, force, nullptr).ok());
+      REQUIRE(problem.external_forces({u, 1.0}, external).ok());
       double largest = 0, left = 0;
       for (const std::int32_t p : problem.body().owned())
         for (int a = 0; a < 2; ++a) {
@@ -120,12 +120,12 @@ TEST_CASE("a following pressure holds a uniform stress in equilibrium beside hel
       Field w = problem.make_field(), K = problem.make_field(), ahead = problem.make_field(), behind = problem.make_field(), moved = problem.make_field();
       for (const std::int32_t p : problem.body().internal())
         for (int a = 0; a < 2; ++a) w.component(a)[p] = std::sin(3.0 * p + a);
-      REQUIRE(problem.add_load_stiffness(u, 1.0, w, K).ok());
+      REQUIRE(problem.add_load_stiffness({u, 1.0}, w, K).ok());
       const double h = 1e-6;
       combine(1, u, h, w, moved);
-      REQUIRE(problem.external_forces(moved, 1.0, ahead).ok());
+      REQUIRE(problem.external_forces({moved, 1.0}, ahead).ok());
       combine(1, u, -h, w, moved);
-      REQUIRE(problem.external_forces(moved, 1.0, behind).ok());
+      REQUIRE(problem.external_forces({moved, 1.0}, behind).ok());
       double off = 0;
       for (const std::int32_t p : problem.body().internal())
         for (int a = 0; a < 2; ++a) off = std::max(off, std::abs(K.component(a)[p] + (ahead.component(a)[p] - behind.component(a)[p]) / (2 * h)));
