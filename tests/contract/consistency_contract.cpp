@@ -6,9 +6,9 @@
 
 #include <cmath>
 
-#include "perikit/core/block_matrix.hpp"
 #include "perikit/core/parallel.hpp"
 #include "tests/contract/fixture.hpp"
+#include "tests/kit/matrices.hpp"
 
 using namespace perikit;
 using namespace perikit::contract;
@@ -152,37 +152,15 @@ TEST_CASE("kinematics: consistent clouds: force = -dE/du, tangent = dF/du, symme
         const Body& body = problem.body();
         deform(body, problem.state().displacement(), 11, 0.02);
         const ConstFieldView u = problem.state().displacement();
-        const Field w = random_direction(problem, 12), v = random_direction(problem, 13), f = force_of(problem, u);
-        const double scale = largest(body, f) * static_cast<double>(body.points()), h = 2e-3 * body.spacing();
-        const auto difference = [&](auto&& value) {
-          return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h);
-        };
-        const double slope = difference([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); });
-        CHECK_MESSAGE(std::abs(slope + dot(body, f, w)) <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ",
-                      slope);
-        Field Kw = problem.make_field(), Kv = problem.make_field();
-        REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
-        REQUIRE(problem.tangent_action({u, 0}, v, Kv).ok());
-        const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
-        const double curvature =
-            difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
-        CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du");
-        CHECK_MESSAGE(std::abs(dot(body, Kv, w) - dot(body, Kw, v)) <= 1e-12 * stiffness, "tangent is not symmetric");
+        const Derivatives at = derivatives_at(problem, u, 12, 2e-3 * body.spacing());
+        CHECK_MESSAGE(at.force <= 1e-7, "force is not -dE/du: off by ", at.force);
+        CHECK_MESSAGE(at.tangent <= 1e-7, "tangent is not dF/du: off by ", at.tangent);
+        CHECK_MESSAGE(at.asymmetry <= 1e-12, "tangent is not symmetric: off by ", at.asymmetry);
         if (d == 3) continue;
         BlockMatrix K;
-        REQUIRE(problem.assemble_tangent({u, 0}, K).ok());
-        double worst = 0;
-        const auto size = static_cast<std::size_t>(d);
-        for (std::size_t r = 0; r < K.rows(); ++r)
-          for (std::size_t a = 0; a < size; ++a) {
-            double product = 0;
-            for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-              for (std::size_t e = 0; e < size; ++e)
-                product += K.values[(b * size + a) * size + e] *
-                           w.component(static_cast<int>(e))[K.point[static_cast<std::size_t>(K.column[b])]];
-            worst = std::max(worst, std::abs(product - Kw.component(static_cast<int>(a))[K.point[r]]));
-          }
-        CHECK_MESSAGE(worst <= 1e-11 * largest(body, Kw), "the assembled tangent is off by ", worst / largest(body, Kw));
+        REQUIRE(problem.assemble_tangent(u, K).ok());
+        const double off = test::product_error(problem, K, at.w, at.Kw);
+        CHECK_MESSAGE(off <= 1e-11, "the assembled tangent is off by ", off);
       }
 }
 
@@ -198,10 +176,7 @@ TEST_CASE("kinematics: consistent clouds are bitwise the same for one, two and t
       deform(simulation->problem().body(), simulation->problem().state().displacement(), 51, 0.02);
       forces.push_back(force_of(simulation->problem(), simulation->problem().state().displacement()));
       if (count == 1) continue;
-      bool same = true;
-      for (const std::int32_t p : simulation->problem().body().internal())
-        for (int a = 0; a < 2; ++a) same = same && forces.front().component(a)[p] == forces.back().component(a)[p];
-      CHECK_MESSAGE(same, "the result is another one with ", count, " threads");
+      CHECK_MESSAGE(difference(simulation->problem().body(), forces.front(), forces.back()) == 0, "the result is another one with ", count, " threads");
     }
     set_thread_count(threads);
   }

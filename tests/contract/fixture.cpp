@@ -1,11 +1,14 @@
 #include "tests/contract/fixture.hpp"
 
+#include <doctest/doctest.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "tests/kit/derivative.hpp"
 
 namespace perikit::contract {
 
@@ -93,6 +96,13 @@ Formulation formulation_of(const Example& example) {
   return make_formulation(registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, registry)));
 }
 
+bool bonds_may_fail(const Example& example, int dimension) {
+  if (formulation_of(example).force_state == ForceState::variational) return true;
+  const std::string damage = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.6\n";
+  CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = damage}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
+  return false;
+}
+
 bool Case::conservative() const { return formulation_of(example).force_state == ForceState::variational; }
 
 std::vector<Case> cases() {
@@ -173,6 +183,14 @@ void deform(const Body& body, FieldView u, std::uint64_t seed, double noise) {
   });
 }
 
+void stretch_at_random(const Body& body, FieldView u, std::uint64_t seed) {
+  deform(body, u, seed, 0.02);
+  for (const std::int32_t p : body.internal()) {
+    const Point x = body.position(static_cast<std::size_t>(p));
+    for (int c = 0; c < u.components; ++c) u.component(c)[p] += 0.2 * x[static_cast<std::size_t>(c)];
+  }
+}
+
 Field force_of(BodyProblem& problem, ConstFieldView u, double* energy) {
   Field f = problem.make_field();
   f.fill(std::numeric_limits<double>::quiet_NaN());
@@ -200,11 +218,38 @@ Field random_direction(const BodyProblem& problem, std::uint64_t seed) {
   return w;
 }
 
+Derivatives derivatives_at(BodyProblem& problem, ConstFieldView u, std::uint64_t seed, double h) {
+  const Body& body = problem.body();
+  const Field v = random_direction(problem, seed + 1), f = force_of(problem, u);
+  Derivatives at{0, 0, 0, random_direction(problem, seed), problem.make_field()};
+  Field Kv = problem.make_field();
+  for (Field* out : {&at.Kw, &Kv}) out->fill(std::numeric_limits<double>::quiet_NaN());
+  if (!problem.tangent_action(u, at.w, at.Kw).ok() || !problem.tangent_action(u, v, Kv).ok()) throw std::runtime_error("no tangent");
+  const auto points = static_cast<double>(body.points()), scale = largest(body, f) * points, stiffness = largest(body, at.Kw) * points;
+  const auto moved = [&](double s) { return shifted(problem, u, at.w, s); };
+  const double slope = test::slope_of([&](double s) { return energy_of(problem, moved(s)); }, h);
+  const double curvature = test::slope_of([&](double s) { return -dot(body, force_of(problem, moved(s)), v); }, h);
+  at.force = std::abs(slope + dot(body, f, at.w)) / scale;
+  at.tangent = std::abs(curvature - dot(body, at.Kw, v)) / stiffness;
+  at.asymmetry = std::abs(dot(body, Kv, at.w) - dot(body, at.Kw, v)) / stiffness;
+  return at;
+}
+
 double dot(const Body& body, ConstFieldView a, ConstFieldView b) {
   double sum = 0;
   for (const std::int32_t p : body.internal())
     for (int c = 0; c < a.components; ++c) sum += a.component(c)[p] * b.component(c)[p];
   return sum;
+}
+
+double difference(const Body& body, ConstFieldView a, ConstFieldView b) {
+  double most = 0;
+  for (const std::int32_t p : body.internal())
+    for (int c = 0; c < a.components; ++c) {
+      const double off = std::abs(a.component(c)[p] - b.component(c)[p]);
+      most = std::isnan(off) ? INFINITY : std::max(most, off);
+    }
+  return most;
 }
 
 double largest(const Body& body, ConstFieldView a) {

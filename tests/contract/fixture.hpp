@@ -71,6 +71,8 @@ struct Case {
   /// Whether the part declares its forces as -dE/du.
   bool conservative() const;
 };
+/// Whether forces are -dE/du, so that bonds may fail; scenes with the others are refused.
+bool bonds_may_fail(const Example& example, int dimension);
 /// Every kinematics in every space, on lattices and clouds, intact and cracked.
 std::vector<Case> cases();
 /// The bodies with tongues, in the plane and in space.
@@ -92,6 +94,8 @@ class Noise {
 void set_field(const Body& body, FieldView field, const std::function<Point(const Point&)>& value);
 /// A smooth, finite deformation with noise on top, admissible everywhere: noise times the spacing.
 void deform(const Body& body, FieldView u, std::uint64_t seed, double noise);
+/// The same with every direction longer.
+void stretch_at_random(const Body& body, FieldView u, std::uint64_t seed);
 /// Forces at u, over memory full of NaN: whatever a kernel forgets to write shows. The energy -> *energy where wanted.
 /// Throws where u is inadmissible.
 Field force_of(BodyProblem& problem, ConstFieldView u, double* energy = nullptr);
@@ -99,8 +103,19 @@ double energy_of(BodyProblem& problem, ConstFieldView u);
 /// u + h w.
 Field shifted(const BodyProblem& problem, ConstFieldView u, ConstFieldView w, double h);
 Field random_direction(const BodyProblem& problem, std::uint64_t seed);
+/// How far forces and tangents at u are from derivatives, by differences of fourth order along random directions of two seeds: far below what is tolerated,
+/// with a rounding error of about 1e-12 of the energy. Outputs are poisoned: whatever a kernel forgets to write shows.
+struct Derivatives {
+  double force;      ///< |dE/dw + f w| over the largest force times the number of points
+  double tangent;    ///< |d(-f v)/dw - v K w| over that of K w
+  double asymmetry;  ///< |w K v - v K w|, likewise
+  Field w, Kw;       ///< the first direction, and the tangent action along it
+};
+Derivatives derivatives_at(BodyProblem& problem, ConstFieldView u, std::uint64_t seed, double h);
 /// Sum over live points and components of a b.
 double dot(const Body& body, ConstFieldView a, ConstFieldView b);
+/// Largest |a - b| of a component over live points.
+double difference(const Body& body, ConstFieldView a, ConstFieldView b);
 /// Largest |component| over live points.
 double largest(const Body& body, ConstFieldView a);
 

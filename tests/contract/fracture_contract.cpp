@@ -15,6 +15,8 @@
 
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/contract/reference_body.hpp"
+#include "tests/kit/derivative.hpp"
+#include "tests/kit/matrices.hpp"
 #include "tests/unit/temporary_folder.hpp"
 
 using namespace perikit;
@@ -49,15 +51,6 @@ void part_at(const Body& body, FieldView u, double height) {
   set_field(body, u, [&](const Point& x) { return Point{0.0, x[1] > height ? 20 * body.spacing() : 0.0, 0.0}; });
 }
 
-/// A finite deformation with noise in which every direction grows.
-void stretch_at_random(const Body& body, FieldView u, std::uint64_t seed) {
-  deform(body, u, seed, 0.02);
-  for (const std::int32_t p : body.internal()) {
-    const Point x = body.position(static_cast<std::size_t>(p));
-    for (int c = 0; c < u.components; ++c) u.component(c)[p] += 0.2 * x[static_cast<std::size_t>(c)];
-  }
-}
-
 struct Response {
   double energy = 0;
   Field force;
@@ -65,56 +58,27 @@ struct Response {
 
 Response respond(BodyProblem& problem, std::uint64_t seed) {
   stretch_at_random(problem.body(), problem.state().displacement(), seed);
-  Response r{0, problem.make_field()};
-  const EvaluationStatus status = problem.evaluate_forces({problem.state().displacement(), 0}, r.force, &r.energy);
-  REQUIRE_MESSAGE(status.ok(), status.description);
+  Response r;
+  r.force = force_of(problem, problem.state().displacement(), &r.energy);
   return r;
-}
-
-double difference(const Body& body, const Field& a, const Field& b) {
-  double most = 0;
-  for (const std::int32_t p : body.internal())
-    for (int c = 0; c < body.dimension(); ++c) most = std::max(most, std::abs(a.component(c)[p] - b.component(c)[p]));
-  return most;
 }
 
 /// |K w - Kw| of the assembled tangent and the tangent action along noise, relative to Kw.
 double tangent_difference(BodyProblem& problem) {
-  const Body& body = problem.body();
-  Field w = problem.make_field(), Kw = problem.make_field();
-  Noise random(21);
-  set_field(body, w, [&](const Point&) { return Point{random(), random(), random()}; });
-  REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
-  const double scale = largest(body, Kw);
+  const Field w = random_direction(problem, 21);
+  Field Kw = problem.make_field();
+  REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
   BlockMatrix K;
-  REQUIRE(problem.terms().assemble({problem.state().displacement(), 0}, K).ok());
-  const auto d = static_cast<std::size_t>(K.dimension);
-  for (std::size_t r = 0; r < K.rows(); ++r)
-    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-      for (std::size_t a = 0; a < d; ++a)
-        for (std::size_t c = 0; c < d; ++c)
-          Kw.component(static_cast<int>(a))[K.point[r]] -=
-              K.values[(b * d + a) * d + c] * w.component(static_cast<int>(c))[K.point[static_cast<std::size_t>(K.column[b])]];
-  return largest(body, Kw) / scale;
+  REQUIRE(problem.terms().assemble(problem.state().displacement(), K).ok());
+  return test::product_error(problem, K, w, Kw);
 }
 
 /// How far the slope of the energy along a random direction is from -force, relative to it.
 double slope_error(BodyProblem& problem, const Response& r) {
-  const int d = problem.dimension();
-  Field w = problem.body().make_field(d), kept = problem.body().make_field(d), scratch = problem.body().make_field(d);
-  Noise random(3);
-  set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
-  const FieldView u = problem.state().displacement();
-  std::copy_n(u.data, u.size(), kept.data());
-  const double h = 1e-5;
-  double energies[2] = {};
-  for (const int side : {0, 1}) {
-    for (std::size_t k = 0; k < u.size(); ++k) u.data[k] = kept.data()[k] + (side == 0 ? -h : h) * w.data()[k];
-    REQUIRE(problem.evaluate_forces({u, 0}, scratch, &energies[side]).ok());
-  }
-  std::copy_n(kept.data(), u.size(), u.data);
-  const double expected = -dot(problem.body(), r.force, w);
-  return std::abs((energies[1] - energies[0]) / (2 * h) - expected) / std::abs(expected);
+  const Field w = random_direction(problem, 3);
+  const ConstFieldView u = problem.state().displacement();
+  const double slope = test::slope_of([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); }, 1e-5), expected = -dot(problem.body(), r.force, w);
+  return std::abs(slope - expected) / std::abs(expected);
 }
 
 /// Largest difference of sampled gradients of an affine motion from its own, fragments apart.
@@ -164,13 +128,6 @@ double quantile(std::vector<Stretched> all, double share) {
   return 0.5 * (all[k].stretch + all[k - 1].stretch);
 }
 
-/// Whether forces are -dE/du, so that bonds may fail; scenes with the others are refused.
-bool suits(const Example& example, int dimension) {
-  if (formulation_of(example).force_state == ForceState::variational) return true;
-  CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = limit}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
-  return false;
-}
-
 /// `selective` knows of bonds that fail in the course of a run: what the dense reference says of this body as it is, the bonds across the
 /// plane failed. Nothing where the reference does not know the kinematics.
 std::optional<Response> dense_response(Simulation& simulation, double height) {
@@ -201,7 +158,7 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
     for (const bool cloud : {false, true})
       for (const int d : {2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
-        if (!suits(example, d)) continue;
+        if (!bonds_may_fail(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud, .two_materials = !formulation_of(example).selective()};
         const auto whole = build(scene_text(options, kinematics_table(example)));
         const double height = plane_height(whole->problem().body());
@@ -242,7 +199,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
-        if (!suits(example, d)) continue;
+        if (!bonds_may_fail(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud, .two_materials = cloud == (d == 2)};
         const auto plain = build(scene_text(options, kinematics_table(example)));
         stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 11);
@@ -303,7 +260,7 @@ TEST_CASE("kinematics: linear and angular momentum stay in every step in which b
                                             "type = \"critical_energy\"\nenergy_release_rate = 0.004\n", "type = \"critical_energy\"\nenergy_release_rate = 0.004\nsoftening = 2\n",
                                             "type = \"max_stress\"\nstrength = 0.04\n"}) {
           INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", criterion);
-          if (!suits(example, d)) continue;
+          if (!bonds_may_fail(example, d)) continue;
           const bool stress = criterion.find("max_stress") != std::string::npos;
           if (stress && formulation_of(example).pairs) continue;
           if (d == 3 && (stress || criterion.find("soft") != std::string::npos)) continue;   // nothing of their own
@@ -423,7 +380,7 @@ TEST_CASE("kinematics: bonds that stay for the second law are the same whatever 
       turned{true, {0, -1, 1, 0}, "-0.03*sin(0.4*y + 0.6*x)", "0.02*sin(0.5*y - 0.3*x)"};   // x = Y, y = -X
   const std::string stretch = "type = \"critical_stretch\"\nstretch = 0.02\n", weaken = "type = \"smooth_degradation\"\nstretch_min = 0.01\nstretch = 0.03\n";
   for (const Example& example : kinematics_examples()) {
-    if (!suits(example, 2)) continue;
+    if (!bonds_may_fail(example, 2)) continue;
     bool held = false;
     for (const std::string& damage : {stretch, stretch + "gradual = true\n", weaken}) {
       INFO(example.part, " (", example.table, example.stabilization, "), ", damage);
@@ -454,7 +411,7 @@ TEST_CASE("kinematics: with the second law no bonds fail that would raise the en
         for (const bool weaken : {false, true}) {
           INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice",
                weaken ? ", weakening" : "");
-          if (!suits(example, d)) continue;
+          if (!bonds_may_fail(example, d)) continue;
           BodyOptions options{.dimension = d, .cloud = cloud};
           // Noise in a body under pressure: bonds that are longer than at rest resist it.
           const auto noise = [](BodyProblem& problem) {
@@ -516,7 +473,7 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
-        if (!suits(example, d)) continue;
+        if (!bonds_may_fail(example, d)) continue;
         BodyOptions options{.dimension = d, .cloud = cloud, .two_materials = cloud == (d == 2)};
         const auto plain = build(scene_text(options, kinematics_table(example)));
         stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 17);
@@ -556,7 +513,7 @@ TEST_CASE("kinematics: bonds fail under laws with history: released energy, mome
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
-        if (!suits(example, d) || formulation_of(example).pairs) continue;
+        if (!bonds_may_fail(example, d) || formulation_of(example).pairs) continue;
         BodyOptions options{.dimension = d, .cloud = cloud, .material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3"};
         const auto plain = build(scene_text(options, kinematics_table(example)));
         stretch_at_random(plain->problem().body(), plain->problem().state().displacement(), 19);
@@ -600,7 +557,7 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
         for (const double share : {0.5, 0.6}) {
           INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice", ", ", share,
                " of the bonds within the limit");
-          if (!suits(example, d)) continue;
+          if (!bonds_may_fail(example, d)) continue;
           BodyOptions options{.dimension = d, .cloud = cloud};
           const auto plain = build(scene_text(options, kinematics_table(example)));
           if (!plain->problem().terms().has_gradients()) continue;
@@ -640,7 +597,7 @@ TEST_CASE("kinematics: forces and energies that are renewed near failed bonds ar
     for (const bool cloud : {false, true})
       for (const int d : {1, 2}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
-        if (!suits(example, d)) continue;
+        if (!bonds_may_fail(example, d)) continue;
         // Large enough that most points lie far from the place where bonds fail.
         BodyOptions options{.dimension = d, .cloud = cloud, .cells = d == 1 ? 400 : 60, .conditions = limit};
         const auto simulation = build(scene_text(options, kinematics_table(example)));
@@ -722,7 +679,7 @@ TEST_CASE("kinematics: points without bonds are free masses") {
     for (const bool cloud : {false, true})
       for (const int d : {1, 2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
-        if (!suits(example, d)) continue;
+        if (!bonds_may_fail(example, d)) continue;
         const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit}, kinematics_table(example)));
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
@@ -744,7 +701,7 @@ TEST_CASE("kinematics: a scene without damage pays nothing") {
   for (const Example& example : kinematics_examples())
     for (const bool cloud : {false, true}) {
       INFO(example.part, " (", example.table, example.stabilization, ") ", cloud ? "cloud" : "lattice");
-      if (!suits(example, 2)) continue;
+      if (!bonds_may_fail(example, 2)) continue;
       BodyOptions options{.dimension = 2, .cloud = cloud};
       const auto plain = build(scene_text(options, kinematics_table(example)));
       options.conditions = limit;

@@ -162,16 +162,11 @@ TEST_CASE("kinematics: the tangent of rate laws is the derivative of a step's fo
   for_every_model([](BodyProblem& problem) {
     walk(problem);
     const Field u = deformed(problem, 34, 0.01);
-    Field w = problem.make_field(), Kw = w;
-    Noise random(36);
-    set_field(problem.body(), w, [&](const Point&) { return Point{random(), random(), random()}; });
-    REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
+    const Field w = random_direction(problem, 36);
+    Field Kw = problem.make_field();
+    REQUIRE(problem.tangent_action(u, w, Kw).ok());
     const double h = 5e-4 * problem.body().spacing();
-    const auto force = [&](double by) {
-      Field v = problem.make_field();
-      for (std::size_t k = 0; k < v.size(); ++k) v.data()[k] = u.data()[k] + by * w.data()[k];
-      return respond(problem, v, 0.0).force;
-    };
+    const auto force = [&](double by) { return respond(problem, shifted(problem, u, w, by), 0.0).force; };
     const Field a = force(-2 * h), b = force(-h), c = force(h), d = force(2 * h);
     double worst = 0;
     for (const std::int32_t p : problem.body().internal())
@@ -249,9 +244,7 @@ TEST_CASE("kinematics: rate laws evaluate symmetric bonds once: the same forces 
           CHECK_MESSAGE((d == 1 || mixed || formulation_of(example).selective() || kept(once->problem()).size() < 0.7 * static_cast<double>(kept(twice->problem()).size())),
                         "both ends keep a history of their own");
           const Response a = walk(once->problem()), b = walk(twice->problem());
-          double worst = 0;
-          for (const std::int32_t p : once->problem().body().internal())
-            for (int c = 0; c < d; ++c) worst = std::max(worst, std::abs(a.force.component(c)[p] - b.force.component(c)[p]));
+          const double worst = difference(once->problem().body(), a.force, b.force);
           CHECK_MESSAGE(worst <= 1e-11 * largest(once->problem().body(), a.force), "forces off by ", worst);
           CHECK_MESSAGE(std::abs(a.energy - b.energy) <= 1e-11 * std::abs(a.energy), a.energy, " against ", b.energy);
         }

@@ -10,6 +10,7 @@
 #include "perikit/core/parallel.hpp"
 #include "perikit/problem/motion.hpp"
 #include "tests/contract/fixture.hpp"
+#include "tests/kit/matrices.hpp"
 
 using namespace perikit;
 using namespace perikit::contract;
@@ -88,32 +89,15 @@ TEST_CASE("kinematics: between faces force = -dE/du and reaction = dE/dU, the ta
     const FieldView u = problem.state().displacement();
     deform(body, u, 101, 0.02);
     to_problem(problem, u);
-    const Field w = random_direction(problem, 102), v = random_direction(problem, 103), f = force_of(problem, u);
-    const double scale = largest(body, f) * static_cast<double>(body.points()), h = 1e-3 * body.spacing();
-    const auto difference = [&](auto&& value) { return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h); };
-    const double slope = difference([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); });
-    if (c.conservative()) CHECK_MESSAGE(std::abs(slope + dot(body, f, w)) <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ", slope);
-    Field Kw = problem.make_field(), Kv = problem.make_field();
-    REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
-    REQUIRE(problem.tangent_action({u, 0}, v, Kv).ok());
-    const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
-    const double curvature = difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
-    CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du: ", dot(body, Kw, v), " against ", curvature);
-    if (c.conservative()) CHECK_MESSAGE(std::abs(dot(body, Kv, w) - dot(body, Kw, v)) <= 1e-12 * stiffness, "tangent is not symmetric");
+    const Derivatives at = derivatives_at(problem, u, 102, 1e-3 * body.spacing());
+    if (c.conservative()) CHECK_MESSAGE(at.force <= 1e-7, "force is not -dE/du: off by ", at.force);
+    CHECK_MESSAGE(at.tangent <= 1e-7, "tangent is not dF/du: off by ", at.tangent);
+    if (c.conservative()) CHECK_MESSAGE(at.asymmetry <= 1e-12, "tangent is not symmetric: off by ", at.asymmetry);
     BlockMatrix K;
     const EvaluationStatus status = problem.assemble_tangent({u, 0}, K);
     REQUIRE_MESSAGE(status.ok(), status.description);
-    const auto d = static_cast<std::size_t>(K.dimension);
-    double worst = 0;
-    for (std::size_t r = 0; r < K.rows(); ++r)
-      for (std::size_t a = 0; a < d; ++a) {
-        double product = 0;
-        for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-          for (std::size_t e = 0; e < d; ++e)
-            product += K.values[(b * d + a) * d + e] * w.component(static_cast<int>(e))[K.point[static_cast<std::size_t>(K.column[b])]];
-        worst = std::max(worst, std::abs(product - Kw.component(static_cast<int>(a))[K.point[r]]));
-      }
-    CHECK_MESSAGE(worst <= 1e-12 * largest(body, Kw), "the assembled tangent is off by ", worst / largest(body, Kw));
+    const double off = test::product_error(problem, K, at.w, at.Kw);
+    CHECK_MESSAGE(off <= 1e-12, "the assembled tangent is off by ", off);
   }
 }
 
@@ -134,10 +118,7 @@ TEST_CASE("kinematics: forces and reactions between faces sum to zero, the same 
       set_thread_count(n);
       double other = 0;
       const Field g = force_of(problem, u, &other);
-      bool same = other == energy;
-      for (const std::int32_t p : body.internal())
-        for (int a = 0; a < body.dimension(); ++a) same = same && f.component(a)[p] == g.component(a)[p];
-      CHECK_MESSAGE(same, n, " threads give other bits");
+      CHECK_MESSAGE((other == energy && difference(body, f, g) == 0), n, " threads give other bits");
     }
     set_thread_count(threads);
     // All moves by 1 along an axis, faces with it: that needs no work.

@@ -11,6 +11,7 @@
 #include "perikit/sdk/stable_step.hpp"
 #include "tests/contract/forwarding_problem.hpp"
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/observers.hpp"
 
 using namespace perikit;
 using namespace perikit::contract;
@@ -68,12 +69,9 @@ double stable_step(const BodyOptions& body, const std::string& of = kinematics) 
 }
 
 /// Ends the run when it is asked for the `at`-th time whether it is to end within a step; 0: never.
-class Signalled final : public Observer {
+class Signalled final : public test::Silent {
  public:
   explicit Signalled(std::int64_t at = 0) : at_(at) {}
-  bool wants_sample(std::int64_t, double) override { return false; }
-  void step_done(const StepReport&) override {}
-  void log(std::string_view) override {}
   bool cancelled() const noexcept override { return at_ > 0 && asked >= at_; }
   bool interrupted() const noexcept override { return ++asked == at_; }
   mutable std::int64_t asked = 0;

@@ -58,25 +58,12 @@ TEST_CASE("kinematics: force = -dE/du, tangent = dF/du, symmetric") {
     const ConstFieldView u = problem.state().displacement();
     const bool conservative = c.conservative();
     CHECK(problem.terms().conservative() == conservative);
-    const Field w = random_direction(problem, 12), v = random_direction(problem, 13);
-    const Field f = force_of(problem, u);
-    const double scale = largest(body, f) * static_cast<double>(body.points());
-    // Differences of fourth order: their error is far below the tolerance, their rounding error about 1e-12 of the energy.
-    const double h = 2e-3 * body.spacing();
-    const auto difference = [&](auto&& value) { return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h); };
-    const double slope = difference([&](double s) { return energy_of(problem, shifted(problem, u, w, s)); });
-    const double mismatch = std::abs(slope + dot(body, f, w));
-    if (conservative) CHECK_MESSAGE(mismatch <= 1e-7 * scale, "force is not -dE/du: ", -dot(body, f, w), " against ", slope);
-    else CHECK_MESSAGE(mismatch > 1e-7 * scale, "declared as not conservative, but its force is -dE/du");
-    Field Kw = poisoned(problem), Kv = poisoned(problem);
-    REQUIRE(problem.tangent_action({u, 0}, w, Kw).ok());
-    REQUIRE(problem.tangent_action({u, 0}, v, Kv).ok());
-    const double curvature = difference([&](double s) { return -dot(body, force_of(problem, shifted(problem, u, w, s)), v); });
-    const double stiffness = largest(body, Kw) * static_cast<double>(body.points());
-    CHECK_MESSAGE(std::abs(curvature - dot(body, Kw, v)) <= 1e-7 * stiffness, "tangent is not dF/du: ", dot(body, Kw, v), " against ", curvature);
-    const double asymmetry = std::abs(dot(body, Kv, w) - dot(body, Kw, v));
-    if (conservative) CHECK_MESSAGE(asymmetry <= 1e-12 * stiffness, "tangent is not symmetric");
-    else CHECK_MESSAGE(asymmetry > 1e-12 * stiffness, "declared as not conservative, but its tangent is symmetric");
+    const Derivatives at = derivatives_at(problem, u, 12, 2e-3 * body.spacing());
+    if (conservative) CHECK_MESSAGE(at.force <= 1e-7, "force is not -dE/du: off by ", at.force);
+    else CHECK_MESSAGE(at.force > 1e-7, "declared as not conservative, but its force is -dE/du");
+    CHECK_MESSAGE(at.tangent <= 1e-7, "tangent is not dF/du: off by ", at.tangent);
+    if (conservative) CHECK_MESSAGE(at.asymmetry <= 1e-12, "tangent is not symmetric: off by ", at.asymmetry);
+    else CHECK_MESSAGE(at.asymmetry > 1e-12, "declared as not conservative, but its tangent is symmetric");
   }
 }
 
@@ -314,27 +301,20 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
     for (const int count : {2, 3}) {
       set_thread_count(count);
       const Field more = force_of(problem, problem.state().displacement());
-      bool same = energy == energy_of(problem, problem.state().displacement());
-      for (const std::int32_t p : problem.body().internal())
-        for (int a = 0; a < one.components(); ++a) same = same && one.component(a)[p] == more.component(a)[p];
-      CHECK_MESSAGE(same, "the result is another one with ", count, " threads");
+      CHECK_MESSAGE((energy == energy_of(problem, problem.state().displacement()) && difference(problem.body(), one, more) == 0), "the result is another one with ", count, " threads");
     }
     set_thread_count(threads);
     body.skip = body.share = false;
     const auto plain = build(scene_text(body, kinematics_table(c.example)));
     std::copy_n(problem.state().displacement().data, problem.state().displacement().size(), plain->problem().state().displacement().data);
     const Field full = force_of(plain->problem(), plain->problem().state().displacement());
-    double worst = 0;
-    for (const std::int32_t p : problem.body().internal())
-      for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(one.component(a)[p] - full.component(a)[p]));
+    double worst = difference(problem.body(), one, full);
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), one), "savings change the result by ", worst / largest(problem.body(), one));
     const Field w = random_direction(problem, 52);
     Field Kw = poisoned(problem), expected = poisoned(problem);
-    REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
-    REQUIRE(plain->problem().tangent_action({problem.state().displacement(), 0}, w, expected).ok());
-    worst = 0;
-    for (const std::int32_t p : problem.body().internal())
-      for (int a = 0; a < one.components(); ++a) worst = std::max(worst, std::abs(Kw.component(a)[p] - expected.component(a)[p]));
+    REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
+    REQUIRE(plain->problem().tangent_action(problem.state().displacement(), w, expected).ok());
+    worst = difference(problem.body(), Kw, expected);
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), Kw), "savings change the tangent by ", worst / largest(problem.body(), Kw));
   }
 }
@@ -343,10 +323,7 @@ namespace {
 
 void check_same(const Body& body, ConstFieldView a, ConstFieldView b) {
   REQUIRE(a.size() == b.size());
-  std::size_t differing = 0;
-  for (int c = 0; c < a.components; ++c)
-    for (const std::int32_t p : body.internal()) differing += a.component(c)[p] != b.component(c)[p];
-  CHECK(differing == 0);
+  CHECK(difference(body, a, b) == 0);
 }
 
 void check_same(const Body& body, const PointSamples& a, const PointSamples& b) {

@@ -45,18 +45,8 @@ class Pair {
   /// Forces and energies of both are the same, bit for bit (but for the sign of zero).
   void compare(const Field& u, const char* when) {
     double energy[2] = {};
-    Field force[2];
-    BodyProblem* const problems[2] = {&some(), &all()};
-    for (int k = 0; k < 2; ++k) {
-      force[k] = problems[k]->make_field();
-      force[k].fill(std::numeric_limits<double>::quiet_NaN());
-      const EvaluationStatus status = problems[k]->evaluate_forces({u, 0}, force[k], &energy[k]);
-      REQUIRE_MESSAGE(status.ok(), status.description);
-    }
-    bool same = energy[0] == energy[1];
-    for (const std::int32_t p : some().body().internal())
-      for (int c = 0; c < force[0].components(); ++c) same = same && force[0].component(c)[p] == force[1].component(c)[p];
-    CHECK_MESSAGE(same, "the result is another one ", when);
+    const Field of_some = force_of(some(), u, &energy[0]), of_all = force_of(all(), u, &energy[1]);
+    CHECK_MESSAGE((energy[0] == energy[1] && difference(some().body(), of_some, of_all) == 0), "the result is another one ", when);
   }
 
  private:
