@@ -158,7 +158,7 @@ TEST_CASE("kinematics: consistent clouds: force = -dE/du, tangent = dF/du, symme
         CHECK_MESSAGE(at.asymmetry <= 1e-12, "tangent is not symmetric: off by ", at.asymmetry);
         if (d == 3) continue;
         BlockMatrix K;
-        REQUIRE(problem.assemble_tangent(u, K).ok());
+        REQUIRE(problem.assemble_tangent({u, 0}, K).ok());
         const double off = test::product_error(problem, K, at.w, at.Kw);
         CHECK_MESSAGE(off <= 1e-11, "the assembled tangent is off by ", off);
       }

@@ -224,7 +224,7 @@ Derivatives derivatives_at(BodyProblem& problem, ConstFieldView u, std::uint64_t
   Derivatives at{0, 0, 0, random_direction(problem, seed), problem.make_field()};
   Field Kv = problem.make_field();
   for (Field* out : {&at.Kw, &Kv}) out->fill(std::numeric_limits<double>::quiet_NaN());
-  if (!problem.tangent_action(u, at.w, at.Kw).ok() || !problem.tangent_action(u, v, Kv).ok()) throw std::runtime_error("no tangent");
+  if (!problem.tangent_action({u, 0}, at.w, at.Kw).ok() || !problem.tangent_action({u, 0}, v, Kv).ok()) throw std::runtime_error("no tangent");
   const auto points = static_cast<double>(body.points()), scale = largest(body, f) * points, stiffness = largest(body, at.Kw) * points;
   const auto moved = [&](double s) { return shifted(problem, u, at.w, s); };
   const double slope = test::slope_of([&](double s) { return energy_of(problem, moved(s)); }, h);
@@ -260,18 +260,6 @@ double largest(const Body& body, ConstFieldView a) {
       most = std::isnan(value) ? INFINITY : std::max(most, value);
     }
   return most;
-}
-
-Field product(const BodyProblem& problem, const BlockMatrix& K, ConstFieldView w) {
-  Field out = problem.body().make_field(K.dimension);
-  const auto d = static_cast<std::size_t>(K.dimension);
-  for (std::size_t r = 0; r < K.rows(); ++r)
-    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-      for (std::size_t a = 0; a < d; ++a)
-        for (std::size_t c = 0; c < d; ++c)
-          out.component(static_cast<int>(a))[K.point[r]] +=
-              K.values[(b * d + a) * d + c] * w.component(static_cast<int>(c))[K.point[static_cast<std::size_t>(K.column[b])]];
-  return out;
 }
 
 }  // namespace perikit::contract

@@ -119,7 +119,4 @@ double difference(const Body& body, ConstFieldView a, ConstFieldView b);
 /// Largest |component| over live points.
 double largest(const Body& body, ConstFieldView a);
 
-/// K w on all points.
-Field product(const BodyProblem& problem, const BlockMatrix& K, ConstFieldView w);
-
 }  // namespace perikit::contract

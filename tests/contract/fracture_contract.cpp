@@ -67,9 +67,9 @@ Response respond(BodyProblem& problem, std::uint64_t seed) {
 double tangent_difference(BodyProblem& problem) {
   const Field w = random_direction(problem, 21);
   Field Kw = problem.make_field();
-  REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
+  REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
   BlockMatrix K;
-  REQUIRE(problem.terms().assemble(problem.state().displacement(), K).ok());
+  REQUIRE(problem.terms().assemble({problem.state().displacement(), 0}, K).ok());
   return test::product_error(problem, K, w, Kw);
 }
 

@@ -312,8 +312,8 @@ TEST_CASE("kinematics: bitwise the same for one, two and three threads, and to r
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), one), "savings change the result by ", worst / largest(problem.body(), one));
     const Field w = random_direction(problem, 52);
     Field Kw = poisoned(problem), expected = poisoned(problem);
-    REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
-    REQUIRE(plain->problem().tangent_action(problem.state().displacement(), w, expected).ok());
+    REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
+    REQUIRE(plain->problem().tangent_action({problem.state().displacement(), 0}, w, expected).ok());
     worst = difference(problem.body(), Kw, expected);
     CHECK_MESSAGE(worst <= 1e-12 * largest(problem.body(), Kw), "savings change the tangent by ", worst / largest(problem.body(), Kw));
   }
