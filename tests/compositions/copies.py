@@ -3,7 +3,7 @@
 usage: copies.py PROGRAM LIBRARY WORK small|all
 
 Half of a body with a plane of symmetry is compared with all of it, and a periodic body with the same one shifted by some
-cells, and with two of its periods. The runs have a criterion by energy or by stress; bonds through the plane or the periodic side fail in all of them.
+cells, and with two of its periods. Bonds through the plane or the periodic side fail in all of them.
 """
 
 import itertools
@@ -38,6 +38,7 @@ KINEMATICS = {
 }
 PAIRS = ("bond_based", "ordinary")
 CRITERIA = {
+    "stretch": 'type = "critical_stretch"\nstretch = 0.06',
     "released": 'type = "critical_energy"\nenergy_release_rate = 0.002',
     "held": 'type = "critical_energy"\nenergy_release_rate = 0.002\nenergy = "held"\nlimit = "equal"',
     "weakening": 'type = "critical_energy"\nenergy_release_rate = 0.002\nsoftening = 4',
@@ -218,7 +219,7 @@ SMALL_HALVES = (
     ("sub_horizon", "stress", 2, False), ("bond_associated", "weakening", 2, True), ("selective baqp", "gradual", 2, False))
 SMALL_PERIODS = (
     ("bond_based", "released", 2, True), ("ordinary", "released", 2, False), ("silling", "released", 2, True), ("baqp", "gradual", 2, False),
-    ("non_spherical", "released", 2, False), ("sub_horizon", "held", 2, True), ("bond_associated", "stress", 2, True))
+    ("baqp", "stretch", 2, True), ("non_spherical", "released", 2, False), ("sub_horizon", "held", 2, True), ("bond_associated", "stress", 2, True))
 RANKED = (("bond_based", "released", False), ("baqp", "released", True), ("bond_associated", "stress", False))
 
 

@@ -34,7 +34,7 @@ struct BodyDamage {
   /// By point, from the nearest interface of two materials, where bonds across it are springs in series [m]; infinite elsewhere. Empty where limits
   /// are no stretches, or there is one region.
   Field distance;
-  /// Of a body with images, where the criterion asks for more than stretches; else null.
+  /// Of a body with images; else null. By energy and by stress copies fail together; by stretch each fails by its own, but for those of fragments.
   std::shared_ptr<const BondCopies> copies;
   bool second_law = false;  ///< bonds whose failure would raise the stored energy stay as they are
 

@@ -209,8 +209,8 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
     warn_of_short_zone(body.frame(), values, length, warnings);
     for (const InterfaceDescription& interface : scene.interfaces) warn_of_short_zone(body.frame(), interface.damage->values, length, warnings);
   }
+  if (images) damage->copies = std::make_shared<const BondCopies>(*parts.families, made);
   if (!damage->by_stretch()) {
-    if (images) damage->copies = std::make_shared<const BondCopies>(*parts.families, made);
     const CrossingBonds crossing = crossing_bonds(*parts.families, parts.formulation, partition, images);
     at.crossing = crossing.plain;
     at.crossing_shares = crossing.shares;
