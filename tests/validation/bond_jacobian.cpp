@@ -9,6 +9,7 @@
 #include "perikit/core/field_operations.hpp"
 #include "tests/contract/fixture.hpp"
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/observers.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -36,14 +37,12 @@ double stretch(const Body& body, ConstFieldView u, BondId bond) {
 }
 
 /// Counts the rounds in which bonds failed.
-class Rounds final : public Observer {
+class Rounds final : public test::Silent {
  public:
   bool wants_sample(std::int64_t, double) override { return true; }
-  void step_done(const StepReport&) override {}
   void log(std::string_view text) override {
     for (auto at = text.find("bonds fail, round"); at != text.npos; at = text.find("bonds fail, round", at + 1)) ++count;
   }
-  bool cancelled() const noexcept override { return false; }
   int count = 0;
 };
 
@@ -64,7 +63,6 @@ Beam beam(const std::string& kinematics, const std::string& integrator) {
 }  // namespace
 
 TEST_CASE("bond Jacobian: what weakening bonds add to the tangent is the derivative of the forces by their integrities") {
-  registry();
   constexpr double onset = 0.02, failure = 0.2, beta = 1.5;
   for (const char* kinematics : {"type = \"bond_based\"", "type = \"ordinary\"", "type = \"conventional\"\nstabilization = \"silling\"", "type = \"baqp\"",
                                  "type = \"projection\"", "type = \"bond_associated\"", "type = \"selective\"\nbase = { type = \"baqp\" }"})
@@ -76,7 +74,7 @@ TEST_CASE("bond Jacobian: what weakening bonds add to the tangent is the derivat
         options.dimension = dimension;
         options.cloud = cloud;
         options.conditions = fmt::format("[damage]\ntype = \"smooth_degradation\"\nsecond_law = false\nstretch_min = {}\nstretch = {}\nbeta = {}\n", onset, failure, beta);
-        const auto simulation = contract::build(contract::scene_text(options, kinematics));
+        const auto simulation = build(contract::scene_text(options, kinematics));
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         const FieldView u = problem.state().displacement();

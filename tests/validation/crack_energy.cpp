@@ -9,6 +9,8 @@
 #include <numbers>
 
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/scene_text.hpp"
+#include "tests/kit/vector_text.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -17,11 +19,6 @@ using namespace perikit::validation;
 namespace {
 
 /// With the parts of this build.
-std::unique_ptr<Simulation> build(const std::string& scene) {
-  registry();
-  return contract::build(scene);
-}
-
 constexpr double Gc = 100, lame = 4e5, spacing = 0.1, m = 3.015;   // lambda = mu
 
 struct Kernel {
@@ -37,25 +34,22 @@ const std::vector<Kernel> kernels{{"\"constant\"", [](double) { return 1.0; }},
 
 enum class Points { lattice, cloud };
 
-std::string vector(int dimension, double value) { return dimension == 1 ? fmt::format("[{}]", value) : dimension == 2 ? fmt::format("[{0}, {0}]", value) : fmt::format("[{0}, {0}, {0}]", value); }
-
 std::string scene(int dimension, Points points, const std::string& kinematics, const Kernel& kernel, const std::string& limit, bool interface) {
   const double width = dimension == 3 ? 1.2 : 2.4;
-  std::string text = fmt::format("format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = {}\nlower = {}\nupper = {}\njitter = {}\n[sets]\nupper = \"x > {}\"\n", dimension,
-                                 dimension == 1 ? "line = \"strain\"\n" : dimension == 2 ? "plane = \"strain\"\n" : "", spacing, vector(dimension, 0), vector(dimension, width),
-                                 points == Points::cloud ? 1e-9 : 0.0, width / 2);
   std::string rim;
   for (int a = 0; a < dimension; ++a) rim += fmt::format("{0}{1} < 0.35 || {1} > {2}", a > 0 ? " || " : "", "xyz"[a], width - 0.35);
-  // Balanced clouds have other weights near their surfaces.
-  text += fmt::format("rim = \"{}\"\n[family]\nhorizon_ratio = {}\ninfluence = {}\n{}[kinematics]\n{}\n", rim, m, kernel.table,
-                      points == Points::cloud ? "consistent = false\n" : "", kinematics);
-  const std::string material = "type = \"linear_elastic\", youngs_modulus = 1.0e6, poisson_ratio = 0.25";
   const auto damage = [&](double of_crack) { return fmt::format("type = \"critical_energy\", energy_release_rate = {}, limit = \"{}\"", of_crack, limit); };
-  text += "[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.25\n";
+  std::string further;
   if (interface)
-    text += fmt::format("[[region]]\nset = \"upper\"\nmaterial = {{ {} }}\n[[interface]]\nbetween = [\"upper\", \"rest\"]\ndamage = {{ {} }}\n", material, damage(Gc));
-  text += fmt::format("[damage]\ntype = \"critical_energy\"\nenergy_release_rate = {}\nlimit = \"{}\"\nno_fail = [\"rim\"]\n", interface ? 1e6 : Gc, limit);
-  return text + "[[boundary]]\nset = \"all\"\ndisplacement = " + vector(dimension, 0) + "\n[integrator]\ntype = \"newton\"\nsteps = 1\n";
+    further = "[[region]]\nset = \"upper\"\nmaterial = { type = \"linear_elastic\", youngs_modulus = 1.0e6, poisson_ratio = 0.25 }\n"
+              "[[interface]]\nbetween = [\"upper\", \"rest\"]\ndamage = { " + damage(Gc) + " }\n";
+  further += fmt::format("[damage]\ntype = \"critical_energy\"\nenergy_release_rate = {}\nlimit = \"{}\"\nno_fail = [\"rim\"]\n", interface ? 1e6 : Gc, limit);
+  // Balanced clouds have other weights near their surfaces.
+  return test::SceneText{.dimension = dimension, .spacing = spacing, .upper = std::vector<double>(static_cast<std::size_t>(dimension), width),
+                         .lattice = fmt::format("jitter = {}", points == Points::cloud ? 1e-9 : 0.0), .sets = fmt::format("upper = \"x > {}\"\nrim = \"{}\"", width / 2, rim),
+                         .family = fmt::format("horizon_ratio = {}\ninfluence = {}\n{}", m, kernel.table, points == Points::cloud ? "consistent = false" : ""), .kinematics = kinematics,
+                         .material = "type = \"linear_elastic\"\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.25",
+                         .further = further + "[[boundary]]\nset = \"all\"\ndisplacement = " + test::vector_text(dimension, 0, 0, 0), .integrator = "type = \"newton\"\nsteps = 1"};
 }
 
 /// Strain at which the first bonds hold their part of Gc: 2 W/m0 omega = Gc omega/S, W = (2 lambda + 2 mu) e^2 in plane strain.

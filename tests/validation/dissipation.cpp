@@ -8,6 +8,8 @@
 
 #include "perikit/core/parallel.hpp"
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/scene_text.hpp"
+#include "tests/kit/vector_text.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -20,16 +22,13 @@ std::string scene(int dimension, const std::string& kinematics, bool cloud, doub
   static const bool known = (registry().add_folder(PERIKIT_REMEMBERING), true);
   static_cast<void>(known);
   const int cells = dimension == 3 ? 5 : dimension == 2 ? 8 : 40;
-  const auto vector = [&](auto a, auto b, auto c) {
-    return dimension == 3 ? fmt::format("[{}, {}, {}]", a, b, c) : dimension == 2 ? fmt::format("[{}, {}]", a, b) : fmt::format("[{}]", a);
-  };
   const double width = 0.01 * cells;
-  return fmt::format(
-      "format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 0.01\nlower = {}\nupper = {}\njitter = {}\n[family]\nhorizon_ratio = 2.2\n"
-      "[kinematics]\n{}\n[material]\ntype = \"remembering\"\ndensity = 1000.0\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.3\n"
-      "viscous_modulus = 1.0e6\nrelaxation_time = 2e-3\n{}\n[initial]\nvelocity = {}\n[integrator]\ntype = \"verlet\"\nend_time = 6e-3\nsafety = {}\n",
-      dimension, dimension == 1 ? "line = \"strain\"\n" : dimension == 2 ? "plane = \"strain\"\n" : "", vector(0, 0, 0), vector(width, width, width), cloud ? 0.2 : 0.0, kinematics, more,
-      vector(fmt::format("\"20*(x - {})\"", width / 2), fmt::format("\"10*(x - {})\"", width / 2), fmt::format("\"-5*(x - {})\"", width / 2)), safety);
+  const auto speed = [&](int factor) { return fmt::format("\"{}*(x - {})\"", factor, width / 2); };
+  return test::SceneText{.dimension = dimension, .spacing = 0.01, .upper = std::vector<double>(static_cast<std::size_t>(dimension), width),
+                         .lattice = fmt::format("jitter = {}", cloud ? 0.2 : 0.0), .family = "horizon_ratio = 2.2", .kinematics = kinematics,
+                         .material = "type = \"remembering\"\ndensity = 1000.0\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.3\nviscous_modulus = 1.0e6\nrelaxation_time = 2e-3",
+                         .further = more + "\n[initial]\nvelocity = " + test::vector_text(dimension, speed(20), speed(10), speed(-5)),
+                         .integrator = fmt::format("type = \"verlet\"\nend_time = 6e-3\nsafety = {}", safety)};
 }
 
 struct Sum {
@@ -49,7 +48,7 @@ Sum sum_of(const std::vector<Energies>& all) {
   return sum;
 }
 
-Sum sum_of(const std::string& text) { return sum_of(contract::run(*contract::build(text)).energies); }
+Sum sum_of(const std::string& text) { return sum_of(contract::run(*build(text)).energies); }
 
 const std::vector<std::string> kinematics{"type = \"conventional\"",
                                           "type = \"conventional\"\norder = 2",
@@ -90,7 +89,7 @@ TEST_CASE("laws that dissipate: two laws, bonds that fail, any number of threads
   const std::string failing = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.006\n";
   for (const char* each : {"type = \"baqp\"", "type = \"conventional\""}) {
     INFO(fmt::format("{}, bonds fail", each));
-    const auto simulation = contract::build(scene(2, each, false, 0.1, failing));
+    const auto simulation = build(scene(2, each, false, 0.1, failing));
     const auto watch = contract::run(*simulation);
     const Energies& end = watch.energies.back();
     CHECK(end.dissipated_by_laws > 0.02 * watch.energies.front().kinetic);
@@ -104,12 +103,12 @@ TEST_CASE("laws that dissipate: two laws, bonds that fail, any number of threads
   for (const int count : {1, 3}) {
     set_thread_count(count);
     std::vector<double> all;
-    for (const Energies& e : contract::run(*contract::build(scene(2, kinematics[2], true, 0.5))).energies) all.push_back(e.dissipated_by_laws);
+    for (const Energies& e : contract::run(*build(scene(2, kinematics[2], true, 0.5))).energies) all.push_back(e.dissipated_by_laws);
     if (first.empty()) first = all;
     CHECK(all == first);
   }
   set_thread_count(threads);
-  const auto simulation = contract::build(scene(2, kinematics[2], false, 0.5));
+  const auto simulation = build(scene(2, kinematics[2], false, 0.5));
   contract::run(*simulation);
   BodyProblem& problem = simulation->problem();
   const std::vector<std::byte> saved = problem.snapshot();

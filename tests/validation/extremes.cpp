@@ -9,6 +9,9 @@
 #include <fstream>
 #include <numbers>
 
+#include "tests/kit/messages.hpp"
+#include "tests/kit/scene_text.hpp"
+#include "tests/kit/vector_text.hpp"
 #include "tests/validation/quasi_static.hpp"
 #include "unit/temporary_folder.hpp"
 
@@ -16,10 +19,6 @@ using namespace perikit;
 using namespace perikit::validation;
 
 namespace {
-
-std::unique_ptr<Simulation> build(const std::string& text, const std::string& file = "extremes.toml") {
-  return std::make_unique<Simulation>(parse_scene(text, file, registry()), registry());
-}
 
 /// Kinematics with its first example as lines of [kinematics].
 std::string table_of(const std::string& kinematics) {
@@ -213,27 +212,15 @@ TEST_CASE("extremes: bodies of one, two and three points in every space run or s
           for (const std::string integrator : {"type = \"verlet\"\nend_time = 1.0", "type = \"newton\"\nsteps = 1",
                                                "type = \"dynamic_relaxation\"\nsteps = 1\nmax_iterations = 2000\ncut_backs = 1",
                                                "type = \"jfnk\"\nsteps = 1", "type = \"kinsol\"\nsteps = 1"}) {
-            const std::string upper = d == 1   ? fmt::format("[{}]", n)
-                                      : d == 2 ? fmt::format("[{}, 1]", n)
-                                               : fmt::format("[{}, 1, 1]", n);
-            const std::string zero = d == 1   ? "[0]"
-                                     : d == 2 ? "[0, 0]"
-                                              : "[0, 0, 0]",
-                              pull = d == 1   ? "[0.1]"
-                                     : d == 2 ? "[0.1, 0]"
-                                              : "[0.1, 0, 0]";
-            const std::string text = fmt::format(
-                "format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 1.0\nlower = {}\nupper = {}\njitter = "
-                "{}\n[sets]\nfirst = {{ points = [0] }}\nlast = {{ points = [{}] }}\n"
-                "[family]\nhorizon_ratio = 3.015\n[kinematics]\n{}\n[material]\ntype = \"neo_hookean\"\ndensity = "
-                "1.0\nshear_modulus = 1.0\nbulk_modulus = 2.0\n"
-                "[[boundary]]\nset = \"first\"\ndisplacement = {}\n[[load]]\nset = \"last\"\nforce = {}\n[integrator]\n{}\n{}",
-                d,
-                d == 2   ? "plane = \"strain\"\n"
-                : d == 1 ? "line = \"strain\"\n"
-                         : "",
-                zero, upper, jitter, n - 1, kinematics, zero, pull, integrator,
-                integrator.starts_with("type = \"verlet") ? "" : "[run]\nweak_springs = 1e-6\n");   // a held point does not hold against turns
+            const std::string zero = test::vector_text(d, 0, 0, 0);
+            std::vector<double> upper{1.0 * n, 1, 1};
+            upper.resize(static_cast<std::size_t>(d));
+            const std::string text = test::SceneText{
+                .dimension = d, .upper = upper, .lattice = "jitter = " + jitter, .sets = fmt::format("first = {{ points = [0] }}\nlast = {{ points = [{}] }}", n - 1),
+                .family = "horizon_ratio = 3.015", .kinematics = kinematics, .material = "type = \"neo_hookean\"\ndensity = 1.0\nshear_modulus = 1.0\nbulk_modulus = 2.0",
+                .further = fmt::format("[[boundary]]\nset = \"first\"\ndisplacement = {}\n[[load]]\nset = \"last\"\nforce = {}\n{}", zero, test::vector_text(d, 0.1, 0, 0),
+                                       integrator.starts_with("type = \"verlet") ? "" : "[run]\nweak_springs = 1e-6\n"),   // a held point does not hold against turns
+                .integrator = integrator};
             INFO(text);
             try {
               const auto simulation = build(text);
@@ -283,12 +270,8 @@ TEST_CASE("extremes: a point that is alone is a free mass in dynamics, and named
           file);
       CHECK_NOTHROW(run(*still));
       // Nothing holds it: there is no equilibrium, or any.
-      std::string message;
-      try {
-        build(scene(fmt::format("type = \"{}\"\nsteps = 1", integrator), ""), file);
-      } catch (const InputError& error) {
-        message = error.what();
-      }
+      const std::string message =
+          test::message_of<InputError>([&] { build(scene(fmt::format("type = \"{}\"\nsteps = 1", integrator), ""), file); });
       CHECK_MESSAGE(message.find("boundary: found nothing that holds a piece of 1 point about (100, 100, 0)") != std::string::npos, message);
     }
   }

@@ -9,6 +9,7 @@
 
 #include "perikit/problem/motion.hpp"
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -35,54 +36,14 @@ void check_order(const std::string& scene, const std::string& law, std::array<in
   CHECK_MESSAGE(order >= least, scene, ", ", law, ": errors ", coarse, " and ", fine, ", order ", order);
 }
 
-const std::string strip = R"(format = 1
-[body]
-dimension = 2
-plane = "strain"
-thickness = 1e-4
-[body.lattice]
-spacing = 5e-5
-lower = [-0.5e-3, {lower}]
-upper = [0.5e-3, 0.5e-3]
-[sets]
-top = "y > 0.45e-3"
-bottom = "y < {below}"
-[family]
-horizon_ratio = 3.015
-[kinematics]
-type = "{kinematics}"
-[material]
-type = "linear_elastic"
-density = 8000.0
-youngs_modulus = 210.0e9
-poisson_ratio = 0.25
-[damage]
-type = "critical_stretch"
-energy_release_rate = 2700.0
-no_fail = ["top", "bottom"]
-[[crack]]
-segment = [[-1e-3, 0], [-0.1e-3, 0]]
-[[boundary]]
-set = "top"
-velocity = ["free", 1.0]
-{conditions}
-[integrator]
-type = "verlet"
-end_time = 1.2e-5
-time_step = 4e-9
-[run]
-threads = 1
-)";
-
 std::unique_ptr<Simulation> cracked(const std::string& law, bool half, const std::string& conditions) {
-  std::string text = strip;
-  const auto replace = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
-  replace("{lower}", half ? "0" : "-0.5e-3");
-  replace("{below}", half ? "0.05e-3" : "-0.45e-3");
-  if (half) replace("no_fail = [\"top\", \"bottom\"]", "no_fail = [\"top\"]");
-  replace("{kinematics}", law);
-  replace("{conditions}", conditions);
-  return std::make_unique<Simulation>(parse_scene(text, "strip.toml", registry()), registry());
+  return build(test::SceneText{.body = "thickness = 1e-4", .spacing = 5e-5, .lower = {-0.5e-3, half ? 0 : -0.5e-3}, .upper = {0.5e-3, 0.5e-3},
+                               .sets = fmt::format("top = \"y > 0.45e-3\"\nbottom = \"y < {}\"", half ? "0.05e-3" : "-0.45e-3"), .family = "horizon_ratio = 3.015", .kinematics = law,
+                               .material = "type = \"linear_elastic\"\ndensity = 8000.0\nyoungs_modulus = 210.0e9\npoisson_ratio = 0.25",
+                               .further = "[damage]\ntype = \"critical_stretch\"\nenergy_release_rate = 2700.0\nno_fail = [" + std::string(half ? "\"top\"" : "\"top\", \"bottom\"") +
+                                          "]\n[[crack]]\nsegment = [[-1e-3, 0], [-0.1e-3, 0]]\n[[boundary]]\nset = \"top\"\nvelocity = [\"free\", 1.0]\n" + conditions +
+                                          "\n[run]\nthreads = 1",
+                               .integrator = "type = \"verlet\"\nend_time = 1.2e-5\ntime_step = 4e-9"});
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "tests/kit/messages.hpp"
 #include "tests/validation/quasi_static.hpp"
 
 using namespace perikit;
@@ -17,7 +18,6 @@ const std::vector<std::string> integrators{"newton", "jfnk", "kinsol", "dynamic_
 const std::string kinematics = "type = \"baqp\"";
 
 BodyOptions plate(const std::string& integrator, const std::string& more) {
-  registry();
   BodyOptions body;
   body.dimension = 2;
   body.cells = 10;
@@ -31,14 +31,7 @@ BodyOptions plate(const std::string& integrator, const std::string& more) {
 std::unique_ptr<Simulation> pulled(const std::string& integrator, const std::string& more, const std::string& motion = "[0.3, 0.1]") {
   BodyOptions body = plate(integrator, more);
   body.conditions += "[[boundary]]\nset = \"right\"\ndisplacement = " + motion + "\n";
-  return contract::build(contract::scene_text(body, kinematics));
-}
-
-double distance(Simulation& a, Simulation& b) {
-  double most = 0;
-  for (const std::int32_t p : a.problem().body().internal())
-    for (int c = 0; c < 2; ++c) most = std::max(most, std::abs(a.problem().state().displacement().component(c)[p] - b.problem().state().displacement().component(c)[p]));
-  return most;
+  return build(contract::scene_text(body, kinematics));
 }
 
 }  // namespace
@@ -78,14 +71,9 @@ TEST_CASE("past a limit point the run ends with load parameter, step and reason"
     body.material = "type = \"hencky\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.0";
     body.sets = "left = \"x < 3\"\nright = \"x > 11\"\n";
     body.conditions = fmt::format("[[boundary]]\nset = \"left\"\ndisplacement = [0]\n[[load]]\nset = \"right\"\nforce = [{}]\n", 2 * 2.0 * 1.5 / std::exp(1.0));
-    const auto simulation = contract::build(contract::scene_text(body, "type = \"projection\""));
+    const auto simulation = build(contract::scene_text(body, "type = \"projection\""));
     Protocol protocol;
-    std::string message;
-    try {
-      simulation->run(protocol);
-    } catch (const RunError& error) {
-      message = error.what();
-    }
+    const std::string message = test::message_of<RunError>([&] { simulation->run(protocol); });
     CAPTURE(message);
     CHECK(message.starts_with(integrator + ": no equilibrium found beyond load parameter 0."));
     for (const char* part : {"the smallest step, 0.0625, failed because ", "limit point"}) CHECK(message.find(part) != std::string::npos);
@@ -103,7 +91,7 @@ TEST_CASE("convergence is relative: units do not matter, and a rigid motion conv
     small.material = "type = \"neo_hookean\"\nshear_modulus = 1.0e9\nbulk_modulus = 2.0e9";
     small.sets = "left = \"x < 0.002\"\nright = \"x > 0.006\"\n";
     small.conditions += "[[boundary]]\nset = \"right\"\ndisplacement = [0.3e-3, 0.1e-3]\n";
-    const auto a = contract::build(contract::scene_text(metres, kinematics)), b = contract::build(contract::scene_text(small, kinematics));
+    const auto a = build(contract::scene_text(metres, kinematics)), b = build(contract::scene_text(small, kinematics));
     const Protocol of_a = run(*a), of_b = run(*b);
     double most = 0;
     for (const std::int32_t p : a->problem().body().internal())
@@ -113,7 +101,7 @@ TEST_CASE("convergence is relative: units do not matter, and a rigid motion conv
 
     BodyOptions rigid = plate(integrator, "steps = 2\ntolerance = 1e-9\n");
     rigid.conditions = "[[boundary]]\nset = \"left\"\ndisplacement = [4, -3]\n";
-    const auto moved = contract::build(contract::scene_text(rigid, kinematics));
+    const auto moved = build(contract::scene_text(rigid, kinematics));
     run(*moved);
     CHECK(std::abs(mean(*moved, "right", 0) - 4) <= 1e-6);
     CHECK(std::abs(mean(*moved, "right", 1) + 3) <= 1e-6);
@@ -167,7 +155,7 @@ TEST_CASE("kinsol's line search shortens steps of a slender body, and its answer
 TEST_CASE("a body that nothing moves stays where it is, with a residual of zero") {
   for (const std::string& integrator : integrators) {
     INFO(integrator);
-    const auto simulation = contract::build(contract::scene_text(plate(integrator, "steps = 2\n"), kinematics));
+    const auto simulation = build(contract::scene_text(plate(integrator, "steps = 2\n"), kinematics));
     const Protocol protocol = run(*simulation);
     CHECK(protocol.reports.size() == 3);
     for (const StepReport& report : protocol.reports) CHECK(report.residual == 0);
@@ -177,10 +165,9 @@ TEST_CASE("a body that nothing moves stays where it is, with a residual of zero"
 }
 
 TEST_CASE("an equilibrium that is not stable is told, by every integrator and once; one that is stable is not") {
-  registry();
   // A column that is shortened, clamped and guided; a small force chooses its side. With few steps the path stays straight beyond Euler's load.
   const auto column = [](const std::string& integrator, double shortened, double aside) {
-    return contract::build(fmt::format(
+    return build(fmt::format(
         "format = 1\n[body]\ndimension = 2\nplane = \"stress\"\n[body.lattice]\nspacing = 0.25\nlower = [0, -0.5]\nupper = [10, 0.5]\n[sets]\ntip = {{ nearest = [10, 0] }}\n"
         "[family]\nhorizon_ratio = 2.515\ninfluence = \"gaussian\"\n[kinematics]\ntype = \"baqp\"\n[material]\ntype = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1200.0\n"
         "poisson_ratio = 0.0\n[[boundary]]\nface = \"-x\"\ndisplacement = [0, 0]\n[[boundary]]\nface = \"+x\"\ndisplacement = [\"-{}*t\", \"free\"]\n[[load]]\nset = \"tip\"\n"
@@ -206,9 +193,8 @@ TEST_CASE("an equilibrium that is not stable is told, by every integrator and on
 }
 
 TEST_CASE("an equilibrium of a nearly incompressible body that is not stable is told by mixed systems; one that is stable is not") {
-  registry();
   const auto column = [](double shortened) {
-    return contract::build(fmt::format(
+    return build(fmt::format(
         "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.25\nlower = [0, -0.5]\nupper = [10, 0.5]\n[family]\nhorizon_ratio = 2.015\n"
         "[kinematics]\ntype = \"selective\"\nbase = \"baqp\"\n[material]\ntype = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = 1000.0\n"
         "[[boundary]]\nface = \"-x\"\ndisplacement = [0, 0]\n[[boundary]]\nface = \"+x\"\ndisplacement = [-{}, \"free\"]\n"
@@ -221,9 +207,8 @@ TEST_CASE("an equilibrium of a nearly incompressible body that is not stable is 
 }
 
 TEST_CASE("forces of any size: what a load does is in proportion to it, from numbers without digits to those whose squares are none") {
-  registry();
   const auto pulled = [](const std::string& integrator, double force) {
-    return contract::build(fmt::format(
+    return build(fmt::format(
         "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 0.4]\n[sets]\nlow = \"x < 0.1\"\nhigh = \"x > 0.9\"\n"
         "[family]\nhorizon_ratio = 2.015\n[kinematics]\ntype = \"baqp\"\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1e6\npoisson_ratio = 0.25\n[[boundary]]\n"
         "set = \"low\"\ndisplacement = [0, 0]\n[[load]]\nset = \"high\"\nforce = [{:.17g}, 0]\n[integrator]\nsteps = 1\n{}",

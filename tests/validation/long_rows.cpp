@@ -9,6 +9,7 @@
 #include "perikit/core/parallel.hpp"
 #include "scene/scene.hpp"
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -23,18 +24,14 @@ struct Forces {
 };
 
 Forces forces_of(int dimension, int length, int width, double jitter, const std::string& kinematics, const std::string& more, double ratio = 3.015) {
-  const char* lower[] = {"[0.0]", "[0.0, 0.0]", "[0.0, 0.0, 0.0]"};
-  const std::string upper = dimension == 1 ? fmt::format("[{}.0]", length) : dimension == 2 ? fmt::format("[{}.0, {}.0]", length, width) : fmt::format("[{}.0, {}.0, {}.0]", length, width, width);
-  const std::string plane = dimension == 2 ? "plane = \"strain\"\n" : dimension == 1 ? "line = \"strain\"\n" : "";
-  const std::string zeros = dimension == 1 ? "" : dimension == 2 ? ", \"0.02*sin(x*y)\"" : ", \"0.02*sin(x*y)\", \"0.01*cos(x + 2*z)\"";
-  const std::string text = fmt::format(
-      "format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 1.0\nlower = {}\nupper = {}\njitter = {}\n{}"
-      "[family]\nhorizon_ratio = {}\n{}[kinematics]\n{}\n[material]\ntype = \"neo_hookean\"\nshear_modulus = 0.8\nbulk_modulus = 2.0\n"
-      "[initial]\ndisplacement = [\"0.05*sin(0.3*x) + 0.01*cos(2*x)\"{}]\n[integrator]\ntype = \"evaluate\"\n",
-      dimension, plane, lower[dimension - 1], upper, jitter, more, ratio, jitter > 0 ? "consistent = false\n" : "", kinematics, zeros);
-  const Scene scene = parse_scene(text, "long_rows.toml", registry());
-  Simulation simulation(scene, registry());
-  BodyProblem& problem = simulation.problem();
+  std::vector<double> upper{1.0 * length, 1.0 * width, 1.0 * width};
+  upper.resize(static_cast<std::size_t>(dimension));
+  const std::string across = dimension == 1 ? "" : dimension == 2 ? ", \"0.02*sin(x*y)\"" : ", \"0.02*sin(x*y)\", \"0.01*cos(x + 2*z)\"";
+  const auto simulation = build(test::SceneText{.dimension = dimension, .upper = upper, .lattice = fmt::format("jitter = {}\n{}", jitter, more),
+                                                .family = fmt::format("horizon_ratio = {}\n{}", ratio, jitter > 0 ? "consistent = false" : ""), .kinematics = kinematics,
+                                                .material = "type = \"neo_hookean\"\nshear_modulus = 0.8\nbulk_modulus = 2.0",
+                                                .further = fmt::format("[initial]\ndisplacement = [\"0.05*sin(0.3*x) + 0.01*cos(2*x)\"{}]", across)});
+  BodyProblem& problem = simulation->problem();
   Forces result;
   Field f = problem.body().make_field(dimension), Kw = problem.body().make_field(dimension);
   REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, f, &result.energy).ok());

@@ -37,11 +37,6 @@ std::string jfnk(const std::string& preconditioner, double tolerance = 1e-8) {
 }
 const std::string newton = "type = \"newton\"\nsteps = 1\ntolerance = 1e-10";
 
-std::unique_ptr<Simulation> make(const std::string& text) {
-  registry();
-  return contract::build(text);
-}
-
 /// Iterations of GMRES of a whole run.
 int krylov_iterations(const Protocol& protocol) {
   int sum = 0;
@@ -50,19 +45,10 @@ int krylov_iterations(const Protocol& protocol) {
   return sum;
 }
 
-double distance(Simulation& a, Simulation& b) {
-  double most = 0;
-  for (const std::int32_t p : a.problem().body().internal())
-    for (int c = 0; c < a.problem().dimension(); ++c)
-      most = std::max(most, std::abs(a.problem().state().displacement().component(c)[p] -
-                                     b.problem().state().displacement().component(c)[p]));
-  return most;
-}
-
 }  // namespace
 
 TEST_CASE("Krylov iterations hardly grow with the bulk modulus") {
-  const Protocol soft = run(*make(scene(3, 8, 5, jfnk("auto")))), hard = run(*make(scene(3, 8, 1e4, jfnk("auto"))));
+  const Protocol soft = run(*build(scene(3, 8, 5, jfnk("auto")))), hard = run(*build(scene(3, 8, 1e4, jfnk("auto"))));
   MESSAGE(krylov_iterations(soft), " iterations with kappa/mu = 5, ", krylov_iterations(hard), " with 1e4");
   CHECK(soft.text.find("preconditioner companion") != std::string::npos);
   CHECK(hard.text.find("preconditioner mixed") != std::string::npos);
@@ -76,7 +62,7 @@ TEST_CASE("prescribed motions of both ends: no step is cut back, and those that 
   for (const int steps : {1, 3}) {
     std::string text = scene(3, 8, 1e4, fmt::format("type = \"jfnk\"\nsteps = {}\ntolerance = 1e-8", steps));
     text.replace(text.find(load), load.size(), "[[boundary]]\nset = \"end\"\ndisplacement = [0, 0, 0.15]\n");
-    const Protocol protocol = run(*make(text));
+    const Protocol protocol = run(*build(text));
     INFO(protocol.text);
     CHECK(protocol.text.find("preconditioner mixed") != std::string::npos);
     CHECK(protocol.text.find("no equilibrium") == std::string::npos);
@@ -105,7 +91,7 @@ TEST_CASE("volumes that alternate between neighbours are warned of") {
         ratio);
   };
   const std::string said = "volumes of points that alternate between neighbours";
-  const auto soft = make(cube(100)), hard = make(cube(1e4));
+  const auto soft = build(cube(100)), hard = build(cube(1e4));
   CHECK(run(*soft).text.find(said) == std::string::npos);
   const std::string text = run(*hard).text;
   REQUIRE(text.find(said) != std::string::npos);
@@ -114,7 +100,7 @@ TEST_CASE("volumes that alternate between neighbours are warned of") {
   MESSAGE("strain energy ", of_soft, " J with kappa/mu = 100, ", of_hard, " J with 1e4");
   CHECK(of_hard > 1.1 * of_soft);  // what is warned of
   // The block that is pulled by loads keeps its volumes.
-  CHECK(run(*make(scene(3, 8, 1e4, jfnk("mixed")))).text.find(said) == std::string::npos);
+  CHECK(run(*build(scene(3, 8, 1e4, jfnk("mixed")))).text.find(said) == std::string::npos);
 }
 
 TEST_CASE("auto takes mixed systems where they are faster: in 3D from a ratio of 20 on lattices, 50 on clouds") {
@@ -122,7 +108,7 @@ TEST_CASE("auto takes mixed systems where they are faster: in 3D from a ratio of
     for (const double ratio : {18.0, 22.0, 45.0, 55.0}) {
       const bool expected = ratio >= (jitter[1] == 0 ? 20 : 50);
       INFO("jitter ", std::string(jitter), ", kappa/mu = ", ratio);
-      CHECK((run(*make(scene(3, 5, ratio, jfnk("auto"), jitter))).text.find("preconditioner mixed") != std::string::npos) == expected);
+      CHECK((run(*build(scene(3, 5, ratio, jfnk("auto"), jitter))).text.find("preconditioner mixed") != std::string::npos) == expected);
     }
 }
 
@@ -140,7 +126,7 @@ TEST_CASE("two materials, of which one or both hardly change their volume: hardl
       for (const auto& [shear, bulk] : {std::pair{1.0, 1.5}, {1.0, 100.0}, {8.0, 16.0}, {0.2, 2000.0}}) {
         INFO(interfaces, ", jitter ", jitter, ", shear modulus ", shear, ", bulk modulus ", bulk);
         const std::string text = scene(3, 4, 1e4, jfnk("mixed", 1e-9), jitter);
-        const auto exact = make(two_materials(scene(3, 4, 1e4, newton, jitter), shear, bulk, interfaces)), found = make(two_materials(text, shear, bulk, interfaces));
+        const auto exact = build(two_materials(scene(3, 4, 1e4, newton, jitter), shear, bulk, interfaces)), found = build(two_materials(text, shear, bulk, interfaces));
         run(*exact);
         const Protocol protocol = run(*found);
         CHECK(distance(*exact, *found) < 1e-7);
@@ -152,7 +138,7 @@ TEST_CASE("auto leaves mixed systems where one material is far stiffer than the 
   for (const double shear : {20.0, 1 / 20.0, 50.0, 1 / 50.0}) {
     INFO("shear modulus ", shear);
     const std::string text = two_materials(scene(3, 4, 1e4, "type = \"jfnk\"\nsteps = 1\ntolerance = 0.9"), shear, 2 * shear, "parallel");
-    CHECK((run(*make(text)).text.find("preconditioner mixed") != std::string::npos) == (shear > 1.0 / 30 && shear < 30));
+    CHECK((run(*build(text)).text.find("preconditioner mixed") != std::string::npos) == (shear > 1.0 / 30 && shear < 30));
   }
 }
 
@@ -160,7 +146,7 @@ TEST_CASE("the stiffness of volumes is that of the energy where the whole body g
   for (const char* interfaces : {"laminate", "parallel"})
     for (const char* jitter : {"0", "0.1"}) {
       INFO(interfaces, ", jitter ", jitter);
-      const auto simulation = make(two_materials(scene(3, 5, 100, jfnk("mixed"), jitter), 0.5, 3.0, interfaces));
+      const auto simulation = build(two_materials(scene(3, 5, 100, jfnk("mixed"), jitter), 0.5, 3.0, interfaces));
       BodyProblem& problem = simulation->problem();
       const std::unique_ptr<VolumetricPart> volumes = problem.volumetric_part();
       Field u = problem.make_field(), force = problem.make_field();
@@ -191,8 +177,8 @@ TEST_CASE("newton's solution, on lattices and clouds, with images, in 2D and 3D,
         Variant{2, 9, "0", symmetric, ""}, Variant{2, 9, "0.1", symmetric, ""}}) {
     for (const double ratio : {5.0, 1e4}) {
       INFO(dimension, "D, kappa/mu = ", ratio, ", jitter ", jitter, " ", more);
-      const auto exact = make(scene(dimension, cells, ratio, newton, jitter, more)),
-                 found = make(scene(dimension, cells, ratio, jfnk("mixed", 1e-9) + keys, jitter, more));
+      const auto exact = build(scene(dimension, cells, ratio, newton, jitter, more)),
+                 found = build(scene(dimension, cells, ratio, jfnk("mixed", 1e-9) + keys, jitter, more));
       run(*exact);
       run(*found);
       CHECK(mean(*exact, "end", dimension - 1) > 1e-3);
@@ -203,8 +189,8 @@ TEST_CASE("newton's solution, on lattices and clouds, with images, in 2D and 3D,
 
 TEST_CASE("bonds that fail: newton's solution and newton's bonds") {
   const std::string damage = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.1\n";
-  const auto exact = make(scene(2, 9, 1000, newton, "0", damage)),
-             found = make(scene(2, 9, 1000, jfnk("mixed", 1e-9), "0", damage));
+  const auto exact = build(scene(2, 9, 1000, newton, "0", damage)),
+             found = build(scene(2, 9, 1000, jfnk("mixed", 1e-9), "0", damage));
   run(*exact);
   run(*found);
   CHECK(!exact->problem().terms().changed_bonds().empty());
@@ -217,7 +203,7 @@ TEST_CASE("bitwise the same for any number of threads") {
   const int before = thread_count();
   for (const int threads : {1, 3}) {
     set_thread_count(threads);
-    found.push_back(make(scene(3, 5, 1e4, jfnk("mixed"))));
+    found.push_back(build(scene(3, 5, 1e4, jfnk("mixed"))));
     run(*found.back());
   }
   set_thread_count(before);
@@ -229,13 +215,13 @@ TEST_CASE("mixed is refused without point volumes, and by kinsol") {
   plain.replace(plain.find("\"selective\"\nbase = \"baqp\""), std::strlen("\"selective\"\nbase = \"baqp\""), "\"baqp\"");
   Protocol protocol;
   const auto words = doctest::Contains("integrator.preconditioner: found \"mixed\", which needs the point volumes of selective");
-  CHECK_THROWS_WITH(make(plain)->run(protocol), words);
-  CHECK_THROWS_WITH(make(plain)->summary(), words);   // `check`, and `run` before it writes anything
-  CHECK_THROWS_WITH(make(scene(3, 3, 5, "type = \"kinsol\"\npreconditioner = \"mixed\"")), doctest::Contains("allowed: "));
+  CHECK_THROWS_WITH(build(plain)->run(protocol), words);
+  CHECK_THROWS_WITH(build(plain)->summary(), words);   // `check`, and `run` before it writes anything
+  CHECK_THROWS_WITH(build(scene(3, 3, 5, "type = \"kinsol\"\npreconditioner = \"mixed\"")), doctest::Contains("allowed: "));
 }
 
 TEST_CASE("mixed: the log says in how many iterations the linear residual fell, and to what share") {
-  const Protocol protocol = run(*make(scene(2, 5, 100, jfnk("mixed"))));
+  const Protocol protocol = run(*build(scene(2, 5, 100, jfnk("mixed"))));
   const std::size_t at = protocol.text.find("gmres ");
   REQUIRE(at != std::string::npos);
   int iterations = 0;

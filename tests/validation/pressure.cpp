@@ -36,7 +36,7 @@ std::unique_ptr<Simulation> under_pressure(const BodyText& body, const std::stri
       "\"{}\"\n[material]\ntype = \"neo_hookean\"\ndensity = 1000.0\n"
       "shear_modulus = 1.0e6\nbulk_modulus = 2.0e6\n{}",
       body.body, body.right, kinematics, more);
-  return std::make_unique<Simulation>(parse_scene(text, "pressure.toml", registry()), registry());
+  return build(text);
 }
 
 /// The largest sum of internal and external forces on a point over the largest external one.
@@ -273,9 +273,8 @@ TEST_CASE("newton and jfnk find the same inflated ring") {
 
 TEST_CASE("newton with a pressure that follows: the tangent of the load is in its equations, and load steps need no cut-back") {
   // A cantilever that an end couple rolls up.
-  registry();
   const auto rolled = [](const std::string& integrator) {
-    return contract::build("format = 1\n[body]\ndimension = 2\nplane = \"stress\"\n[body.lattice]\nspacing = 0.25\nlower = [0, -0.5]\nupper = [6, 0.5]\n[sets]\nend = \"x > 5.75\"\n"
+    return build("format = 1\n[body]\ndimension = 2\nplane = \"stress\"\n[body.lattice]\nspacing = 0.25\nlower = [0, -0.5]\nupper = [6, 0.5]\n[sets]\nend = \"x > 5.75\"\n"
                     "pin = { nearest = [0, 0] }\n[family]\nhorizon_ratio = 2.515\ninfluence = \"gaussian\"\n[kinematics]\ntype = \"projection\"\n[material]\n"
                     "type = \"saint_venant_kirchhoff\"\nyoungs_modulus = 1000.0\npoisson_ratio = 0.0\n[[symmetry]]\naxis = \"x\"\n[[boundary]]\nset = \"pin\"\ndisplacement = "
                     "[\"free\", 0]\n[[load]]\nset = \"end\"\nface = \"+x\"\npressure = \"-120*y\"\nfollower = true\n[integrator]\nsteps = 6\n" + integrator);

@@ -39,6 +39,15 @@ inline Protocol run(Simulation& simulation) {
   return protocol;
 }
 
+/// The largest difference of displacements.
+inline double distance(Simulation& a, Simulation& b) {
+  double most = 0;
+  for (const std::int32_t p : a.problem().body().internal())
+    for (int c = 0; c < a.problem().dimension(); ++c)
+      most = std::max(most, std::abs(a.problem().state().displacement().component(c)[p] - b.problem().state().displacement().component(c)[p]));
+  return most;
+}
+
 /// Mean displacement of a set.
 inline double mean(Simulation& simulation, const std::string& set, int component) {
   double sum = 0;

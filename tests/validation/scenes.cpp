@@ -21,6 +21,10 @@ std::unique_ptr<Simulation> load(const std::string& scene, std::vector<std::stri
   return std::make_unique<Simulation>(read_scene(file, registry(), {.overrides = std::move(overrides)}), registry());
 }
 
+std::unique_ptr<Simulation> build(const std::string& text, const std::string& file) {
+  return std::make_unique<Simulation>(parse_scene(text, file, registry()), registry());
+}
+
 double error_of_run(Simulation& simulation) {
   contract::run(simulation);
   BodyProblem& problem = simulation.problem();

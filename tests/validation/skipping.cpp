@@ -10,6 +10,8 @@
 #include "perikit/body/influence.hpp"
 #include "scene/scene.hpp"
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/observers.hpp"
+#include "tests/kit/scene_text.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -72,102 +74,22 @@ struct Run {
 };
 
 /// A long bar whose left end is pushed.
-const std::string bar = R"toml(format = 1
-[body]
-dimension = 1
-[body.lattice]
-spacing = 1e-3
-lower = [0]
-upper = [4]
-[sets]
-left = "x < 3e-3"
-[family]
-horizon_ratio = 3.015
-influence = "gaussian"
-[kinematics]
-type = "baqp"
-[material]
-type = "neo_hookean"
-density = 1000.0
-shear_modulus = 1e6
-bulk_modulus = 2e6
-[[boundary]]
-set = "left"
-displacement = ["1e-4 * sin(1e3*t)"]
-[integrator]
-type = "verlet"
-end_time = 1.5e-3
-)toml";
+const std::string bar = test::SceneText{.dimension = 1, .space = "", .spacing = 1e-3, .upper = {4}, .sets = "left = \"x < 3e-3\"", .family = "horizon_ratio = 3.015\ninfluence = \"gaussian\"",
+                                        .material = "type = \"neo_hookean\"\ndensity = 1000.0\nshear_modulus = 1e6\nbulk_modulus = 2e6",
+                                        .further = "[[boundary]]\nset = \"left\"\ndisplacement = [\"1e-4 * sin(1e3*t)\"]", .integrator = "type = \"verlet\"\nend_time = 1.5e-3"};
 
 /// A long notched strip that flies apart. Bonds near the notch fail, some of them in most steps.
-const std::string tear = R"toml(format = 1
-[body]
-dimension = 2
-plane = "strain"
-[body.lattice]
-spacing = 0.1
-lower = [0, 0]
-upper = [12, 2.4]
-seed = 5
-[sets]
-far = "abs(x - 6) > 1"
-[[crack]]
-segment = [[6, -1], [6, 0.8]]
-[family]
-horizon_ratio = 2.015
-influence = "constant"
-[kinematics]
-type = "baqp"
-[material]
-type = "saint_venant_kirchhoff"
-density = 1000.0
-youngs_modulus = 1e6
-poisson_ratio = 0.3
-[damage]
-type = "critical_stretch"
-stretch = 0.02
-no_fail = ["far"]
-[initial]
-velocity = ["0.5*(x - 6)", 0]
-[integrator]
-type = "verlet"
-end_time = 0.048
-safety = 0.15
-[output]
-history_every = 20
-)toml";
+const std::string tear = test::SceneText{.spacing = 0.1, .upper = {12, 2.4}, .lattice = "seed = 5", .sets = "far = \"abs(x - 6) > 1\"", .family = "horizon_ratio = 2.015\ninfluence = \"constant\"",
+                                         .material = "type = \"saint_venant_kirchhoff\"\ndensity = 1000.0\nyoungs_modulus = 1e6\npoisson_ratio = 0.3",
+                                         .further = "[[crack]]\nsegment = [[6, -1], [6, 0.8]]\n[damage]\ntype = \"critical_stretch\"\nstretch = 0.02\nno_fail = [\"far\"]\n"
+                                                    "[initial]\nvelocity = [\"0.5*(x - 6)\", 0]\n[output]\nhistory_every = 20",
+                                         .integrator = "type = \"verlet\"\nend_time = 0.048\nsafety = 0.15"};
 
 /// A strip that is pulled in equal load steps.
-const std::string strip = R"toml(format = 1
-[body]
-dimension = 2
-plane = "strain"
-[body.lattice]
-spacing = 0.1
-lower = [0, 0]
-upper = [2, 1]
-[sets]
-left = "x < 0.1"
-right = "x > 1.9"
-[family]
-horizon_ratio = 2.015
-influence = "gaussian"
-[kinematics]
-type = "projection"
-[material]
-type = "linear_elastic"
-youngs_modulus = 1.0
-poisson_ratio = 0.3
-[[boundary]]
-set = "left"
-displacement = [0, 0]
-[[boundary]]
-set = "right"
-displacement = [0.02, 0]
-[integrator]
-type = "newton"
-steps = 5
-)toml";
+const std::string strip = test::SceneText{.spacing = 0.1, .upper = {2, 1}, .sets = "left = \"x < 0.1\"\nright = \"x > 1.9\"", .family = "horizon_ratio = 2.015\ninfluence = \"gaussian\"",
+                                          .kinematics = "projection", .material = "type = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.3",
+                                          .further = "[[boundary]]\nset = \"left\"\ndisplacement = [0, 0]\n[[boundary]]\nset = \"right\"\ndisplacement = [0.02, 0]",
+                                          .integrator = "type = \"newton\"\nsteps = 5"};
 
 }  // namespace
 
@@ -307,12 +229,9 @@ TEST_CASE("skipping: points held at rest have no forces beyond the reach of free
 
 TEST_CASE("skipping: energies are only summed where history samples") {
   /// Samples one step in ten.
-  class Sparse final : public Observer {
+  class Sparse final : public test::Silent {
    public:
     bool wants_sample(std::int64_t step, double) override { return step % 10 == 0; }
-    void step_done(const StepReport&) override {}
-    void log(std::string_view) override {}
-    bool cancelled() const noexcept override { return false; }
   };
   Run sparse(bar, {"body.lattice.upper=[0.2]"}), full(bar, {"body.lattice.upper=[0.2]"});
   Sparse observer;

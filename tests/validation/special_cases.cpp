@@ -9,6 +9,9 @@
 #include <vector>
 
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/derivative.hpp"
+#include "tests/kit/matrices.hpp"
+#include "tests/kit/observers.hpp"
 #include "tests/validation/scenes.hpp"
 
 using namespace perikit;
@@ -17,33 +20,20 @@ using contract::BodyOptions;
 
 namespace {
 
-struct Response {
-  double energy = 0;
-  Field force;
-};
-
-Response respond(BodyProblem& problem) {
-  Response r{0, problem.make_field()};
-  const EvaluationStatus status = problem.evaluate_forces({problem.state().displacement(), 0}, r.force, &r.energy);
-  REQUIRE_MESSAGE(status.ok(), status.description);
-  return r;
-}
-
 /// Energies and forces of two kinematics in the same finite, noisy deformation.
 void check_same(const BodyOptions& options, const std::string& a, const std::string& b) {
-  registry();
   INFO(a, " against ", b, ", ", options.dimension, "D ", options.influence, options.crack ? " cracked" : "");
-  const auto one = contract::build(contract::scene_text(options, a)), two = contract::build(contract::scene_text(options, b));
+  const auto one = build(contract::scene_text(options, a)), two = build(contract::scene_text(options, b));
   for (const auto& simulation : {one.get(), two.get()}) {
     contract::deform(simulation->problem().body(), simulation->problem().state().displacement(), 61, 0.02);
   }
-  const Response r = respond(one->problem()), s = respond(two->problem());
+  double energy = 0, expected = 0;
+  const Field force = contract::force_of(one->problem(), one->problem().state().displacement(), &energy);
+  const Field other = contract::force_of(two->problem(), two->problem().state().displacement(), &expected);
   const Body& body = one->problem().body();
-  double worst = 0;
-  for (const std::int32_t p : body.internal())
-    for (int c = 0; c < body.dimension(); ++c) worst = std::max(worst, std::abs(r.force.component(c)[p] - s.force.component(c)[p]));
-  CHECK_MESSAGE(std::abs(r.energy - s.energy) <= 1e-12 * s.energy, r.energy, " against ", s.energy);
-  CHECK_MESSAGE(worst <= 1e-11 * contract::largest(body, s.force), "forces differ by ", worst, " of ", contract::largest(body, s.force));
+  const double worst = contract::difference(body, force, other);
+  CHECK_MESSAGE(std::abs(energy - expected) <= 1e-12 * expected, energy, " against ", expected);
+  CHECK_MESSAGE(worst <= 1e-11 * contract::largest(body, other), "forces differ by ", worst, " of ", contract::largest(body, other));
 }
 
 }  // namespace
@@ -91,7 +81,8 @@ TEST_CASE("projection with weight = \"kernel\" and baqp coincide where the point
                                                  "body.lattice.upper=[462.5, 462.5, 462.5]", "sets.inside={ nearest = [225, 225, 225] }"});
     };
     const auto one = run("{ type = \"projection\", weight = \"kernel\" }"), two = run("{ type = \"baqp\" }");
-    const Response r = respond(one->problem()), s = respond(two->problem());
+    const Field force = contract::force_of(one->problem(), one->problem().state().displacement());
+    const Field expected = contract::force_of(two->problem(), two->problem().state().displacement());
     PointSamples a, b;
     REQUIRE(one->problem().terms().sample({one->problem().state().displacement(), 0}, a).ok());
     REQUIRE(two->problem().terms().sample({two->problem().state().displacement(), 0}, b).ok());
@@ -100,8 +91,8 @@ TEST_CASE("projection with weight = \"kernel\" and baqp coincide where the point
     CHECK(std::abs(a.strain_energy_density.data()[p] - density) <= 1e-12 * density);
     double worst = 0, scale = 0;
     for (int c = 0; c < 3; ++c) {
-      worst = std::max(worst, std::abs(r.force.component(c)[p] - s.force.component(c)[p]));
-      scale = std::max(scale, std::abs(s.force.component(c)[p]));
+      worst = std::max(worst, std::abs(force.component(c)[p] - expected.component(c)[p]));
+      scale = std::max(scale, std::abs(expected.component(c)[p]));
     }
     CHECK(scale > 0);
     CHECK_MESSAGE(worst <= 1e-11 * scale, "forces differ by ", worst, " of ", scale);
@@ -109,14 +100,13 @@ TEST_CASE("projection with weight = \"kernel\" and baqp coincide where the point
 }
 
 TEST_CASE("selective leaves evaluation points alone whose owner has no gradient of its own") {
-  registry();
   // A block with a spur one point wide: the families of its last four points lie on a line.
   const auto spur = [](bool cloud, const std::string& kinematics) {
     std::string text = contract::scene_text({.dimension = 2, .cloud = cloud, .cells = 16}, kinematics);
     const std::string section = "[body.lattice]\n", jitter = "jitter = 0.25";
     text.insert(text.find(section) + section.size(), "inside = \"x < 8 || (y > 4 && y < 5)\"\n");
     if (cloud) text.replace(text.find(jitter), jitter.size(), "jitter = 1e-13");
-    auto simulation = contract::build(text);
+    auto simulation = build(text);
     contract::deform(simulation->problem().body(), simulation->problem().state().displacement(), 61, 0.02);
     return simulation;
   };
@@ -151,35 +141,23 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
         REQUIRE(problem.evaluate_forces({u, 0}, scratch, &value).ok());
         return value;
       };
-      const double h = 2e-3, slope = (8 * (energy(h) - energy(-h)) - (energy(2 * h) - energy(-2 * h))) / (12 * h);
+      const double slope = test::slope_of(energy, 2e-3);
       CHECK(std::abs(slope + contract::dot(body, f, w)) <= 1e-7 * contract::largest(body, f) * static_cast<double>(body.points()));
       // The assembled tangent knows these owners too.
       Field Kw = problem.body().make_field(2);
       BlockMatrix K;
-      REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
-      REQUIRE(problem.assemble_tangent({problem.state().displacement(), 0}, K).ok());
-      double worst = 0;
-      for (std::size_t r = 0; r < K.rows(); ++r)
-        for (int a = 0; a < 2; ++a) {
-          double sum = 0;
-          for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-            for (int c = 0; c < 2; ++c) {
-              const double value = K.values[4 * b + static_cast<std::size_t>(2 * a + c)];
-              sum += value * w.component(c)[K.point[static_cast<std::size_t>(K.column[b])]];
-            }
-          worst = std::max(worst, std::abs(sum - Kw.component(a)[K.point[r]]));
-        }
-      CHECK_MESSAGE(worst <= 1e-12 * contract::largest(body, Kw), "K w is off by ", worst);
+      REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
+      REQUIRE(problem.assemble_tangent(problem.state().displacement(), K).ok());
+      CHECK(test::product_error(problem, K, w, Kw) <= 1e-12);
     }
 }
 
 TEST_CASE("a report counts the evaluation points of a force evaluation: points, bonds, or parts of families") {
-  registry();
   for (const bool cloud : {false, true}) {
     INFO(std::string(cloud ? "cloud" : "lattice"));
     std::size_t points = 0;
     const auto count = [&](const std::string& kinematics) {
-      const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cloud = cloud, .cells = 8}, kinematics));
+      const auto simulation = build(contract::scene_text({.dimension = 2, .cloud = cloud, .cells = 8}, kinematics));
       points = simulation->problem().body().points();
       return simulation->problem().terms().report().evaluation_points;
     };
@@ -193,8 +171,7 @@ TEST_CASE("a report counts the evaluation points of a force evaluation: points, 
 }
 
 TEST_CASE("a consistent cloud says between which bounds its weights lie, positive ones about 1") {
-  registry();
-  const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cloud = true, .consistent = true, .cells = 8}, "type = \"baqp\""));
+  const auto simulation = build(contract::scene_text({.dimension = 2, .cloud = true, .consistent = true, .cells = 8}, "type = \"baqp\""));
   double low = 0, high = 0;
   for (const auto& [label, text] : simulation->problem().terms().report().notes)
     if (const std::size_t at = text.find("w/W "); at != std::string::npos) REQUIRE(std::sscanf(text.c_str() + at, "w/W %lf to %lf", &low, &high) == 2);
@@ -204,19 +181,16 @@ TEST_CASE("a consistent cloud says between which bounds its weights lie, positiv
 }
 
 TEST_CASE("one evaluation is a sample of step 0 at time 0") {
-  class Asked final : public Observer {
+  class Asked final : public test::Silent {
    public:
     bool wants_sample(std::int64_t step, double time) override {
       asked.emplace_back(step, time);
       return true;
     }
     void step_done(const StepReport& report) override { CHECK(report.time == 0); }
-    void log(std::string_view) override {}
-    bool cancelled() const noexcept override { return false; }
     std::vector<std::pair<std::int64_t, double>> asked;
   };
-  registry();
-  const auto simulation = contract::build(contract::scene_text({.dimension = 2, .cells = 6}, "type = \"baqp\""));
+  const auto simulation = build(contract::scene_text({.dimension = 2, .cells = 6}, "type = \"baqp\""));
   Asked observer;
   simulation->run(observer);
   REQUIRE(observer.asked.size() == 1);
@@ -224,13 +198,12 @@ TEST_CASE("one evaluation is a sample of step 0 at time 0") {
 }
 
 TEST_CASE("bonds that fail give what they owe to every point, the first one too: momentum is kept") {
-  registry();
   for (const bool cloud : {false, true}) {
     INFO(std::string(cloud ? "cloud" : "lattice"));
     contract::BodyOptions body{.dimension = 1, .cloud = cloud, .cells = 2, .integrator = "type = \"verlet\"\nend_time = 0.5"};
     body.material = "type = \"saint_venant_kirchhoff\"\ndensity = 1.0\nyoungs_modulus = 2000.0\npoisson_ratio = 0.3";
     body.conditions = "[initial]\nvelocity = [\"3*(x - 1)\"]\n[damage]\ntype = \"critical_stretch\"\nstretch = 0.02\n";
-    const auto simulation = contract::build(contract::scene_text(body, "type = \"baqp\""));
+    const auto simulation = build(contract::scene_text(body, "type = \"baqp\""));
     BodyProblem& problem = simulation->problem();
     const auto momentum = [&] {
       double sum = 0, size = 0;
@@ -251,13 +224,12 @@ TEST_CASE("bonds that fail give what they owe to every point, the first one too:
 }
 
 TEST_CASE("bonds that fail while their points are inside out: nothing is taken of them that is not a number, and the summary says so") {
-  registry();
   for (const bool cloud : {false, true}) {
     INFO(std::string(cloud ? "cloud" : "lattice"));
     contract::BodyOptions body{.dimension = 2, .cloud = cloud, .cells = 12};
     body.material = "type = \"saint_venant_kirchhoff\"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
     body.conditions = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.5\n";
-    const auto simulation = contract::build(contract::scene_text(body, "type = \"baqp\""));
+    const auto simulation = build(contract::scene_text(body, "type = \"baqp\""));
     BodyProblem& problem = simulation->problem();
     REQUIRE(problem.fracture_summary().find("inside out") == std::string::npos);
     // One half is mirrored, which leaves its bonds their lengths, and goes away from the other.
