@@ -146,8 +146,8 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       // The assembled tangent knows these owners too.
       Field Kw = problem.body().make_field(2);
       BlockMatrix K;
-      REQUIRE(problem.tangent_action(problem.state().displacement(), w, Kw).ok());
-      REQUIRE(problem.assemble_tangent(problem.state().displacement(), K).ok());
+      REQUIRE(problem.tangent_action({problem.state().displacement(), 0}, w, Kw).ok());
+      REQUIRE(problem.assemble_tangent({problem.state().displacement(), 0}, K).ok());
       CHECK(test::product_error(problem, K, w, Kw) <= 1e-12);
     }
 }
