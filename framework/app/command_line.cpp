@@ -100,13 +100,13 @@ void add_commands(CLI::App& app, Options& options) {
       ->excludes("--operations");
   bench_command->add_option("--threads", options.bench.threads, "Threads")->capture_default_str()->check(CLI::Range(1, 1024));
   CLI::App* new_command = add("new", "Write a project for a part of your own, ready to build", start_project);
-  new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator")->required();
+  new_command->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence, term or integrator")->required();
   new_command->add_option("name", options.part, "Its name, and that of the folder")->required();
   new_command->add_flag("--history", options.history, "A material that remembers: variables of its own at each evaluation point, and dissipated energy");
   add("contract", "Run the contract suites on every part of a library", contract)
       ->add_option("library", options.library, "Library of parts (FILE.so)")->required();
   add("list", "List the known parts", list)
-      ->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence or integrator");
+      ->add_option("kind", options.kind, "kinematics, stabilization, material, damage, influence, term or integrator");
   CLI::App* describe_command =
       add("describe", "Describe a part: parameters, equations, source, limits; or the keys of scenes and studies", describe);
   describe_command->add_option("part", options.part, "KIND/NAME, e.g. material/hencky; scene, or scene/SECTION, e.g. scene/output; study");

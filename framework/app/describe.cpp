@@ -24,12 +24,13 @@ Kind parse_kind(const std::string& text) {
       fmt::format("found the unknown kind '{}'; allowed: {}{}", text, fmt::join(names, ", "), did_you_mean(text, names)));
 }
 
-/// Where a scene holds a part of this kind.
-std::string_view scene_table(Kind kind) {
+/// The header of the table that holds a part of this kind in a scene.
+std::string scene_header(Kind kind) {
   switch (kind) {
-    case Kind::influence: return "family.influence";
-    case Kind::stabilization: return "kinematics.stabilization";
-    default: return name(kind);
+    case Kind::influence: return "[family.influence]";
+    case Kind::stabilization: return "[kinematics.stabilization]";
+    case Kind::term: return "[[term]]";
+    default: return fmt::format("[{}]", name(kind));
   }
 }
 
@@ -116,6 +117,7 @@ std::string section_note(const std::string& section) {
            "an expression in x, y, z that is true at them; the one point nearest to a place; a list of indices. `all` is the set of all points.\n\n"
            "```toml\n[sets]\nleft = \"x < 0.01 && y > 0\"\ntip = { nearest = [0.2, 0] }\nmarks = { points = [3, 12, 40] }\n```\n\n";
   }
+  if (section == "term") return "A list, `[[term]]`: each has the `type` of a part of the kind *term*, the keys of that part, and these.\n\n";
   return {};
 }
 
@@ -143,7 +145,7 @@ std::string describe_part(Registry& registry, const std::string& part) {
   out += parameter_lines(d.parameters);
   out += "\nExample\n";
   for (const std::string& example : d.examples) {
-    std::string table = fmt::format("[{}]\ntype = \"{}\"\n{}", scene_table(kind), d.name, example);
+    std::string table = fmt::format("{}\ntype = \"{}\"\n{}", scene_header(kind), d.name, example);
     indent(out, table);
   }
   return out;

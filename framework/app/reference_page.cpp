@@ -39,7 +39,7 @@ std::string part_of(Kind kind, const PartDescription& d) {
   if (!d.limits.empty()) out += fmt::format("Limits: {}\n\n", d.limits);
   out += table_of(d.parameters);
   for (const std::string& example : d.examples) {
-    out += fmt::format("\n{}", fenced(fmt::format("[{}]\ntype = \"{}\"{}{}", name(kind), d.name, example.empty() ? "" : "\n", example), "toml"));
+    out += fmt::format("\n{}", fenced(fmt::format("{}\ntype = \"{}\"{}{}", kind == Kind::term ? "[[term]]" : fmt::format("[{}]", name(kind)), d.name, example.empty() ? "" : "\n", example), "toml"));
   }
   return out + "\n";
 }

@@ -38,3 +38,4 @@
 #include "perikit/kinematics.hpp"
 #include "perikit/sdk/law_material.hpp"
 #include "perikit/stabilization.hpp"
+#include "perikit/term.hpp"

@@ -296,9 +296,9 @@ void Verlet::run(Problem& problem, Observer& observer) {
   if (fresh) {
     stepper.prescribed_speed(state.time, speeds);
     problem.constraints().prescribe_velocity(state.time, v);
+    std::copy_n(v.data, v.size(), stepper.half().data);
     const bool sample = observer.wants_sample(0, state.time);
     stepper.evaluate(sample ? &state.energies.strain : nullptr, dt);
-    std::copy_n(v.data, v.size(), stepper.half().data);
     last_dt = 0;
     observer.step_done(report());
   } else {

@@ -1,10 +1,11 @@
-/// Kinematics of every class as a third party may write them: no part of perikit, no example tables, no dense reference.
+/// Kinematics of every class, and terms, as a third party may write them: no part of perikit, no example tables, no dense reference.
 
 #include <memory>
 
 #include "perikit/core/tensor.hpp"
 #include "perikit/kinematics.hpp"
 #include "perikit/sdk/law_material.hpp"
+#include "perikit/sdk/law_term.hpp"
 
 using namespace perikit;
 
@@ -117,6 +118,43 @@ class Selective final : public MappedKinematics {
   Base base_;
 };
 
+/// A fluid that the body moves through: f = -c v.
+struct Drag {
+  static constexpr TermTraits traits{.constants = 1, .conservative = false, .dissipates = true, .velocity = true, .constant_tangent = true};
+  void constants(const MaterialInput& input, double* k) const { k[0] = input.value("coefficient"); }
+  template <class T, std::size_t d, class K>
+  Vector<T, d> force(const Vector<T, d>& /*u*/, const Vector<Pack, d>& v, const Vector<Pack, d>& /*x*/, double /*time*/, const K& k) const noexcept {
+    Vector<T, d> f;
+    for (std::size_t c = 0; c < d; ++c) f[c] = -(k[0] * v[c]);
+    return f;
+  }
+};
+
+/// A well that moves along with the time, and a force across the displacement, which no energy has.
+struct Swirl {
+  static constexpr TermTraits traits{.constants = 1, .conservative = false, .time = true};
+  void constants(const MaterialInput& input, double* k) const { k[0] = input.value("coefficient"); }
+  template <class T, std::size_t d, class K>
+  T energy(const Vector<T, d>& u, const Vector<Pack, d>& x, double time, const K& k) const noexcept {
+    const T along = u[0] - 0.1 * std::sin(time);
+    return k[0] * (sqrt(1.0 + along * along) + 0.01 * time * (x[0] * u[d - 1]));
+  }
+  template <class T, std::size_t d, class K>
+  Vector<T, d> force(const Vector<T, d>& u, const Vector<Pack, d>& /*v*/, const Vector<Pack, d>& /*x*/, double /*time*/, const K& k) const noexcept {
+    Vector<T, d> f;
+    for (std::size_t c = 0; c < d; ++c) f[c] = 0.3 * k[0] * (c == 0 ? T(-u[d - 1]) : u[0]);
+    return f;
+  }
+};
+
+template <class Law>
+void add_term(Registrar& registrar, const char* name) {
+  ParameterTable table;
+  table.expression("coefficient", "-", "How strong it is.").require().with_time();
+  registrar.term({.name = name, .summary = name, .parameters = std::move(table), .examples = {"coefficient = 0.2", "coefficient = \"0.2 + 0.1*x*t\""}},
+                 [](const ParameterValues&, const PartFactory&) { return std::make_unique<LawTerm<Law>>(); });
+}
+
 template <class Part>
 void add(Registrar& registrar, const char* name) {
   registrar.kinematics({.name = name, .summary = name, .parameters = {}, .examples = {""}},
@@ -130,6 +168,8 @@ PERIKIT_PLUGIN(registrar) {
   add<Bonds>(registrar, "their_bonds");
   add<Blend>(registrar, "their_blend");
   add_rubber<TextbookRubber>(registrar, "their_rubber");
+  add_term<Drag>(registrar, "their_drag");
+  add_term<Swirl>(registrar, "their_swirl");
   add<Domains>(registrar, "their_domains");
   add<Pairs>(registrar, "their_pairs");
   add<Selective<Bonds>>(registrar, "their_selective_bonds");

@@ -4,7 +4,7 @@ import functools
 import re
 import tomllib
 
-PARTS = ("kinematics", "material", "damage", "influence", "integrator", "stabilization")
+PARTS = ("kinematics", "material", "damage", "influence", "term", "integrator", "stabilization")
 
 
 @functools.cache
@@ -52,7 +52,8 @@ def section_fault(path, table, known):
         section = inside + key
         kind = key if key in PARTS else None
         if kind and (section in known or key in known[path]):
-            found = part_fault(kind, value, known) if not isinstance(value, list) else None
+            entries = value if isinstance(value, list) and kind == "term" else [] if isinstance(value, list) else [value]
+            found = next(filter(None, (part_fault(kind, entry, known) for entry in entries)), None)
         elif section in known:
             found = next(filter(None, (section_fault(section, entry, known) for entry in (value if isinstance(value, list) else [value]))), None)
         elif key in known[path]:

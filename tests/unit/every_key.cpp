@@ -74,6 +74,10 @@ upper = 1.0
 set = "left"
 traction = [1, 0]
 face = "-x"
+[[term]]
+type = "foundation"
+set = "left"
+stiffness = 1.0
 [integrator]
 type = "verlet"
 end_time = 1.0
@@ -159,6 +163,7 @@ struct Slot {
 Slot slot_of(Kind kind) {
   if (kind == Kind::influence) return {"family.influence", "family.influence"};
   if (kind == Kind::stabilization) return {"kinematics.stabilization", "kinematics.stabilization"};
+  if (kind == Kind::term) return {"term", "term.0"};
   return {std::string(name(kind)), std::string(name(kind))};
 }
 
@@ -172,8 +177,9 @@ SceneDraft with_part(Kind kind, const PartDescription& part) {
     draft.append(fmt::format("[{}]\ntype = \"{}\"\n{}", slot.section, part.name, part.examples.front()));
     return draft;
   }
-  const std::size_t begin = text.find(fmt::format("[{}]\n", slot.section)), end = text.find("\n[", begin);
-  text.replace(begin, end - begin, fmt::format("[{}]\ntype = \"{}\"\n{}", slot.section, part.name, part.examples.front()));
+  const std::string header = kind == Kind::term ? "[[term]]\n" : fmt::format("[{}]\n", slot.section);
+  const std::size_t begin = text.find(header), end = text.find("\n[", begin);
+  text.replace(begin, end - begin, fmt::format("{}type = \"{}\"\n{}", header, part.name, part.examples.front()));
   if (kind == Kind::damage) {  // interfaces have the criterion of [damage]
     const std::size_t first = text.find("[[interface]]"), last = text.find("\n[", first) + 1;
     text.erase(first, last - first);
@@ -215,6 +221,7 @@ TEST_CASE("every key of every section of a scene, spoilt in every way, is refuse
                                                     {"symmetry", "symmetry.0"},
                                                     {"periodic", "periodic.0"},
                                                     {"load", "load.0"},
+                                                    {"term", "term.0"},
                                                     {"output", "output"},
                                                     {"output.history", "output.history.0"},
                                                     {"run", "run"}};

@@ -46,7 +46,7 @@ std::string list(const Parameter& p, const std::string& of) {
 }  // namespace
 
 std::string_view name(Kind kind) noexcept {
-  constexpr std::array<std::string_view, 6> names{"kinematics", "stabilization", "material", "damage", "influence", "integrator"};
+  constexpr std::array<std::string_view, 7> names{"kinematics", "stabilization", "material", "damage", "influence", "term", "integrator"};
   return names[static_cast<std::size_t>(kind)];
 }
 

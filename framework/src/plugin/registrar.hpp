@@ -18,7 +18,7 @@ inline constexpr std::string_view snake_case_rule = "snake_case (a-z, 0-9, singl
 
 /// In the order of Kind.
 using AnyFactory = std::variant<Factory<Kinematics>, Factory<Stabilization>, Factory<Material>, Factory<Damage>,
-                                Factory<InfluenceFunction>, Factory<Integrator>>;
+                                Factory<InfluenceFunction>, Factory<PointTerm>, Factory<Integrator>>;
 
 struct RegisteredPart {
   PartDescription description;
@@ -37,6 +37,7 @@ class PartCollector final : public Registrar {
   void material(PartDescription d, Factory<Material> f) override { add({std::move(d), std::move(f)}); }
   void damage(PartDescription d, Factory<Damage> f) override { add({std::move(d), std::move(f)}); }
   void influence(PartDescription d, Factory<InfluenceFunction> f) override { add({std::move(d), std::move(f)}); }
+  void term(PartDescription d, Factory<PointTerm> f) override { add({std::move(d), std::move(f)}); }
   void integrator(PartDescription d, Factory<Integrator> f) override { add({std::move(d), std::move(f)}); }
 
   std::vector<std::shared_ptr<const RegisteredPart>> parts;

@@ -19,6 +19,7 @@
 #include "perikit/material.hpp"
 #include "perikit/plugin/abi.hpp"
 #include "perikit/stabilization.hpp"
+#include "perikit/term.hpp"
 #include "plugin/library.hpp"
 #include "plugin/manifest.hpp"
 #include "plugin/registrar.hpp"
@@ -300,6 +301,7 @@ std::unique_ptr<Damage> Registry::damage(const PartValues& values) const {
 std::unique_ptr<InfluenceFunction> Registry::influence(const PartValues& values) const {
   return implementation_->create<InfluenceFunction>(Kind::influence, values, *this);
 }
+std::unique_ptr<PointTerm> Registry::term(const PartValues& values) const { return implementation_->create<PointTerm>(Kind::term, values, *this); }
 std::unique_ptr<Integrator> Registry::integrator(const PartValues& values) const {
   return implementation_->create<Integrator>(Kind::integrator, values, *this);
 }

@@ -58,6 +58,7 @@ class Registry final : public PartFactory, public PartCatalogue {
   std::unique_ptr<Material> material(const PartValues&) const override;
   std::unique_ptr<Damage> damage(const PartValues&) const override;
   std::unique_ptr<InfluenceFunction> influence(const PartValues&) const override;
+  std::unique_ptr<PointTerm> term(const PartValues&) const override;
   std::unique_ptr<Integrator> integrator(const PartValues&) const override;
 
  private:

@@ -44,9 +44,10 @@ void refuse_ranks(const ProblemParts& parts) {
 }  // namespace
 
 BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
-    : Problem(values_), parts_(std::move(parts)), values_(std::move(values)) {
+    : Problem(values_), parts_(std::move(parts)), values_(std::move(values)), driven_work_(*parts_.terms, values_.state) {
   if (parts_.partition) ghosts_.emplace(*parts_.partition, dimension());
   if (parts_.images) seen_ = make_field();
+  driven_work_.begin({state().displacement(), state().time, 0, terms().driven_by_velocity() ? state().velocity() : FieldView{}});
 }
 
 BodyProblem::~BodyProblem() = default;
@@ -138,9 +139,7 @@ EvaluationStatus BodyProblem::sample(PointSamples& samples) {
 
 void BodyProblem::describe(EvaluationStatus& status) const {
   if (status.ok()) return;
-  status.description = fmt::format("inadmissible deformation ({}) at {}, kinematics {}, material {}",
-                                   terms().has_gradients() ? "det F <= 0 or not finite" : "a bond of zero or non-finite length",
-                                   status.description, parts_.kinematics, parts_.materials[status.material]);
+  status.description = fmt::format("inadmissible deformation {}, kinematics {}, material {}", status.description, parts_.kinematics, parts_.materials[status.material]);
 }
 
 void BodyProblem::share(FieldView field) {
@@ -247,11 +246,14 @@ AssembledSize BodyProblem::assembled_size() {
 void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) {
   if (!companion_) companion_ = std::make_unique<Companion>(*parts_.families, laws());
   companion_->limit_bulk(most_bulk);
-  over_own(K, companion_of_terms_, [&](BlockMatrix& of_terms) { companion_->assemble(seen(u, seen_), of_terms); });
+  over_own(K, companion_of_terms_, [&](BlockMatrix& of_terms) {
+    companion_->assemble(seen(u, seen_), of_terms);
+    terms().add_stiffness_of_points({u, state().time}, of_terms);   // where a point is inadmissible, forces say so
+  });
 }
 
 bool BodyProblem::constant_stiffness() const noexcept {
-  return terms().has_gradients() && laws().constant_tangent() && !parts_.fracture.damage();
+  return terms().constant_tangent() && !parts_.fracture.damage();
 }
 
 void BodyProblem::accept() {
@@ -263,8 +265,10 @@ void BodyProblem::accept() {
 void BodyProblem::revert() { terms().revert(); }
 
 bool BodyProblem::update_bonds(const Configuration& at, double elapsed, FieldView velocity) {
-  if (!parts_.fracture.damage()) return false;
   const ConstFieldView u = at.u();
+  const Configuration reached(u, at.time(), 0, velocity);
+  driven_work_.end(reached);
+  if (!parts_.fracture.damage()) return false;
   const Seen whole = seen(u, seen_);
   std::vector<std::int32_t> moved;
   StepInside step;
@@ -284,7 +288,10 @@ bool BodyProblem::update_bonds(const Configuration& at, double elapsed, FieldVie
   }
   const BondUpdate update = parts_.fracture.update(terms(), at.moved_to(whole), elapsed, state(), step);
   if (update.changed == 0) return false;
-  if (velocity.data) renew_forces(moved, update.ends);
+  if (velocity.data) {
+    renew_forces(reached, moved, update.ends);
+    driven_work_.begin(reached);
+  }
   find_pieces(true);
   return true;
 }
@@ -323,20 +330,20 @@ double BodyProblem::push(FieldView force, double time, double since, FieldView v
   return total_over_ranks(growth);
 }
 
-void BodyProblem::renew_forces(std::span<const std::int32_t> moved, std::span<const std::int32_t> lost) {
+void BodyProblem::renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost) {
   double* const energy = energy_wanted_ ? &state().energies.strain : nullptr;
   EvaluationStatus status;
   if (ghosts_ || images() || weak_springs_) {
-    status = evaluate_forces(configuration(), state().internal_force(), energy);
+    status = evaluate_forces(at, state().internal_force(), energy);
   } else {
-    status = terms().renew_forces(configuration(), moved, lost, state().internal_force(), energy);
+    status = terms().renew_forces(at, moved, lost, state().internal_force(), energy);
     describe(status);
   }
   if (!status.ok()) throw RunError("after bonds have failed: " + status.description);
 }
 
 std::string BodyProblem::watch_pieces(double weak_springs) {
-  weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, weak_springs);
+  weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, terms(), weak_springs);
   find_pieces(true);
   return weak_springs_->names();
 }
@@ -362,6 +369,7 @@ std::vector<std::byte> BodyProblem::bonds() const {
 void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   ByteReader in(bonds);
   parts_.fracture.read_here(terms(), in);
+  driven_work_.begin(configuration());
   find_pieces(false);
 }
 

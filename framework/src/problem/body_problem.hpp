@@ -10,7 +10,9 @@
 #include "body/partition/partition.hpp"
 #include "operators/samples.hpp"
 #include "perikit/problem/problem.hpp"
+#include "problem/driven_work.hpp"
 #include "problem/fracture/fracture_record.hpp"
+#include "terms/term.hpp"
 #include "problem/ghosts.hpp"
 
 namespace perikit {
@@ -95,6 +97,9 @@ class BodyProblem final : public Problem {
                       const std::function<void(std::span<const std::byte>)>& next) const;
   void restore(ByteReader& in);
 
+  /// Whether laws or terms lose energy.
+  bool dissipates() const noexcept { return laws().dissipates() || terms().driven(Drive::loss); }
+
   Terms& terms() noexcept { return *parts_.terms; }
   const Terms& terms() const noexcept { return *parts_.terms; }
   const Families& families() const noexcept { return *parts_.families; }
@@ -119,6 +124,7 @@ class BodyProblem final : public Problem {
 
   ProblemParts parts_;
   ProblemValues values_;
+  DrivenWork driven_work_;
   std::optional<Ghosts> ghosts_;
   /// A field as the terms see it, as long as this lives. Values of ghosts lie in the field itself meanwhile, and are zero again, as they
   /// are in all fields of a problem, after it; none of an owner changes, so that a field that its caller may only read is taken as well.
@@ -157,7 +163,7 @@ class BodyProblem final : public Problem {
   /// See StepInside::act. since: of the end of the step [s].
   double push(FieldView force, double time, double since, FieldView velocity, std::vector<std::int32_t>& moved);
   /// Forces and strain energy become those of the bonds that are left, where the points are.
-  void renew_forces(std::span<const std::int32_t> moved, std::span<const std::int32_t> lost);
+  void renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost);
 
   Field seen_, seen_direction_;
   bool energy_wanted_ = false;   ///< by the last evaluation of forces

@@ -100,7 +100,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   }
   frame_times_ = scene.output.times;
   std::sort(frame_times_.begin(), frame_times_.end());
-  columns_ = perikit::history_columns(scene, simulation.problem().laws().dissipates());
+  columns_ = perikit::history_columns(scene, simulation.problem().dissipates());
   GatheredReferenceConfiguration reference(simulation.problem());
   reference.use([&](const ReferenceData& data) { body_ = body_fingerprint(data); });
   if (first_) output_ = std::make_unique<OutputFolder>(folder_, use_of_folder(scene, folder_, force));
@@ -405,7 +405,7 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
                           energies.dissipated,
                           static_cast<double>(report.iterations),
                           report.residual};
-  if (problem.laws().dissipates()) row.push_back(energies.dissipated_by_laws);
+  if (problem.dissipates()) row.push_back(energies.dissipated_by_laws);
   const OutputDescription& output = simulation_.scene().output;
   for (const HistoryDescription& record : output.history)
     row.push_back(record.value ? 0 : reduced(record, problem, fields_, report.time));

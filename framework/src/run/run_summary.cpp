@@ -54,7 +54,7 @@ std::string RunRecorder::closing(const TimesBefore& before) const {
   text += fmt::format("memory        {:.3g} MB of arrays, {:.3g} MB at most{}\n", arrays / 1e6, peak / 1e6,
                       communicator().size() > 1 ? ", on the rank with most" : "");
   const Energies& e = problem.state().energies;
-  const std::string by_laws = problem.laws().dissipates() ? fmt::format(" ({:.6g} J by laws)", e.dissipated_by_laws) : "";
+  const std::string by_laws = problem.dissipates() ? fmt::format(" ({:.6g} J by laws)", e.dissipated_by_laws) : "";
   text += fmt::format("energy        strain {:.6g} J, kinetic {:.6g} J, dissipated {:.6g} J{}, work put in {:.6g} J", e.strain,
                       e.kinetic, e.dissipated, by_laws, e.external_work);
   if (EnergyBalance last{.initial = done_.energies.initial}; problem.state().step > 0) {

@@ -71,9 +71,9 @@ void Simulation::evaluate_conditions() {
   for (std::size_t k = 0; k < scene_.output.history.size(); ++k) {
     const HistoryDescription& record = scene_.output.history[k];
     if (record.reduce == "mass") problem_->masses().by_point();   // throws where a density is missing
-    if (record.value && !problem_->laws().dissipates() && std::ranges::find(record.value->columns(), "dissipated_by_laws") != record.value->columns().end())
+    if (record.value && !problem_->dissipates() && std::ranges::find(record.value->columns(), "dissipated_by_laws") != record.value->columns().end())
       throw InputError(record.value->position(), fmt::format("output.history.{}.value", k),
-                       "found the column dissipated_by_laws, which there is only where a law dissipates; allowed: the other columns");
+                       "found the column dissipated_by_laws, which there is only where a law or a term dissipates; allowed: the other columns");
     if (!record.exact) continue;
     for (const std::int32_t p : body.set(record.set)) (*record.exact)(body.position(static_cast<std::size_t>(p)), 0);
   }

@@ -111,6 +111,12 @@ struct LoadDescription {
   SourcePosition position;  ///< of it
 };
 
+/// A point term and the points that it acts on.
+struct TermDescription {
+  std::string set;
+  std::shared_ptr<const PartValues> part;
+};
+
 struct HistoryDescription {
   std::string name, set, quantity, component, reduce;
   SourcePosition position;                   ///< of the quantity
@@ -136,7 +142,7 @@ struct OutputDescription {
   std::vector<std::size_t> derived;          ///< those with a value from other columns, each after the ones that it uses
 };
 
-/// The columns that every history.csv begins with, and dissipated_by_laws, which follows where a law dissipates.
+/// The columns that every history.csv begins with, and dissipated_by_laws, which follows where a law or a term dissipates.
 const std::vector<std::string>& fixed_history_columns();
 
 struct Scene {
@@ -168,6 +174,7 @@ struct Scene {
   std::vector<SymmetryDescription> symmetries;
   std::vector<PeriodicDescription> periodics;
   std::vector<LoadDescription> loads;
+  std::vector<TermDescription> terms;
   OutputDescription output;
   bool skip = true;                          ///< [run]: leave out work whose result is known
   bool share = true;                         ///< [run]: compute what is equal once
@@ -199,7 +206,8 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file, Pa
 std::shared_ptr<const PartValues> parse_part(Kind kind, const std::string& type, const std::string& toml, PartCatalogue& parts);
 
 /// The keys of the scene's own sections ("" for the top level, "body", "body.lattice", "family", "output", ...), for `describe`
-/// and the reference page. "kinematics" and "damage" hold the keys that the framework adds to every part of these kinds.
+/// and the reference page. "kinematics", "damage" and "term" hold the keys that the framework adds to every part of
+/// these kinds.
 const std::vector<std::pair<std::string, ParameterTable>>& scene_sections();
 
 }  // namespace perikit

@@ -1,4 +1,4 @@
-// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [output], [run]: what happens to the body, and what is kept of it. Columns of the
+// [initial], [[boundary]], [[symmetry]], [[periodic]], [[load]], [[term]], [output], [run]: what happens to the body, and what is kept of it. Columns of the
 // history: scene_history.cpp.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -156,6 +156,16 @@ void SceneReader::read_loads(const toml::table& root) {
     }
     description.ramp = ramp_of(values, {description.components.begin(), description.components.end()});
     scene_.loads.push_back(std::move(description));
+  }
+}
+
+void SceneReader::read_terms(const toml::table& root) {
+  std::size_t count = 0;
+  for (const toml::table* term : sections(root, "term", "term")) {
+    const auto part = reader_.part(Kind::term, *term, fmt::format("term.{}", count++));
+    if (!part) continue;
+    writer_.part(*part);
+    scene_.terms.push_back({set_of(part->values), part});
   }
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 const std::vector<std::string> section_names{"constants", "body",     "sets",      "family",     "kinematics", "material",
                                              "region",    "damage",   "interface", "crack",      "initial",    "boundary",
-                                             "symmetry",  "periodic", "load",      "integrator", "output",     "run"};
+                                             "symmetry",  "periodic", "load",      "term",       "integrator", "output",     "run"};
 
 bool identifier(std::string_view name) {
   return !name.empty() && !std::isdigit(static_cast<unsigned char>(name[0])) &&
@@ -59,6 +59,7 @@ void SceneReader::read(toml::table& root) {
   read_boundaries(root);
   read_planes(root);
   read_loads(root);
+  read_terms(root);
   read_output(root);
   read_run(root);
   find_unused_constants(root);

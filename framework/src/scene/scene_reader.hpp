@@ -41,6 +41,7 @@ class SceneReader {
   /// [[symmetry]] and [[periodic]].
   void read_planes(const toml::table& root);
   void read_loads(const toml::table& root);
+  void read_terms(const toml::table& root);
   void read_output(const toml::table& root);
   void read_history(const toml::table& output);
   void read_column(const toml::table& record, const ParameterValues& values, HistoryDescription& column);

@@ -269,6 +269,7 @@ ParameterTable run_parameters() {
 ParameterTable common_part_parameters(Kind kind) {
   ParameterTable table;
   if (kind == Kind::kinematics) table.part("stabilization", Kind::stabilization, "Against zero-energy modes.");
+  if (kind == Kind::term) table.string("set", "The points that it acts on.").by_default("\"all\"");
   if (kind == Kind::damage) {
     table.add(ParameterType::texts, "no_fail", "-", "Sets of points whose bonds never fail.").by_default("[]");
     table.boolean("gradual", "Explicit runs: a bond that fails lets go in the time that a Rayleigh wave needs along it, not at once.").by_default("false");
@@ -303,6 +304,7 @@ const std::vector<std::pair<std::string, ParameterTable>>& scene_sections() {
                                                                {"symmetry", symmetry_parameters()},
                                                                {"periodic", periodic_parameters()},
                                                                {"load", load_parameters()},
+                                                               {"term", common_part_parameters(Kind::term)},
                                                                {"output", output_parameters()},
                                                                {"output.history", history_parameters()},
                                                                {"run", run_parameters()}};

@@ -200,6 +200,7 @@ class LoadSteps {
   void settle(double span, Solution& solution) {
     const double t = (position() + span) / planned();
     Energies& energies = state_.energies;
+    state_.time = t;
     take();
     continues_ = true;
     bool settled = false;
@@ -278,6 +279,7 @@ class LoadSteps {
 
   void give_up() {
     problem_.revert();
+    state_.time = position() / planned();
     if (bonds_.empty()) return;
     state_.energies = first_;
     copy(first_u_, u_);

@@ -21,6 +21,7 @@
 #include "setup/gradient_order.hpp"
 #include "setup/laminate_interfaces.hpp"
 #include "setup/materials.hpp"
+#include "setup/point_terms.hpp"
 #include "setup/surfaces/image_planes.hpp"
 
 namespace perikit {
@@ -236,6 +237,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   of_terms.further = std::move(further);
+  if (TermMaker point_terms = build_point_terms(scene, factory, integrator)) of_terms.further.push_back(std::move(point_terms));
   steps.begin("evaluation points");
   if (of_terms.consistency) of_terms.consistency->show_share = [&steps](double share) { steps.share_done(share); };
   parts.terms = std::make_unique<Terms>(of_terms);

@@ -16,6 +16,7 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   }
   std::int64_t tangent(const Configuration& at, ConstFieldView w, const Region& region, FieldView Kw) override;
   void report(ModelReport& report) const override;
+  bool constant_tangent() const noexcept override { return parts_.laws.constant_tangent(); }
   AssembledTerm* assembled() noexcept override { return this; }
   SampledTerm* sampled() noexcept override { return this; }
   BreakableTerm* breakable() noexcept override { return this; }

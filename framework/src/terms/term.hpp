@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <span>
+#include <string_view>
 
 #include "assembly/assembly.hpp"
 #include "assembly/volumetric_rows.hpp"
@@ -43,6 +44,7 @@ class AssembledTerm;
 class SampledTerm;
 class BreakableTerm;
 class StatefulTerm;
+class DrivenTerm;
 
 class Term {
  public:
@@ -54,6 +56,11 @@ class Term {
   /// Adds bytes, counts and notes of what is left out.
   virtual void report(ModelReport& report) const = 0;
 
+  /// What an inadmissible point is, in words.
+  virtual std::string_view inadmissible() const noexcept { return "det F <= 0 or not finite"; }
+  /// Whether the tangent is the same at all displacements and times, as long as no bond fails.
+  virtual bool constant_tangent() const noexcept { return false; }
+
   /// Null: the tangent couples no two points, and its blocks are taken from `tangent`.
   virtual AssembledTerm* assembled() noexcept { return nullptr; }
   /// Null: energies by point are unknown, and samples lack them.
@@ -62,6 +69,8 @@ class Term {
   virtual BreakableTerm* breakable() noexcept { return nullptr; }
   /// Null: it remembers nothing.
   virtual StatefulTerm* stateful() noexcept { return nullptr; }
+  /// Null: its forces are minus the derivative of its energy, at all times of the same.
+  virtual DrivenTerm* driven() noexcept { return nullptr; }
 };
 
 /// A term whose tangent couples points.
@@ -115,6 +124,21 @@ class StatefulTerm {
   virtual std::vector<HistoryPlace> history_points() = 0;
   /// Energies that are dissipated in a step come with its forces.
   virtual bool dissipates() const noexcept = 0;
+};
+
+/// Where the work goes that forces do and no energy holds.
+enum class Drive : int { outside, loss };
+
+/// A term whose forces do other work than its energy falls by: it depends on the time, or its forces are no derivative.
+class DrivenTerm {
+ public:
+  virtual ~DrivenTerm() = default;
+  /// Whether something of it is driven so, here or on another rank.
+  virtual bool driven(Drive drive) const noexcept = 0;
+  /// Forces and energies of what is driven so, alone. Returns as Term::forces does.
+  virtual std::int64_t driven_forces(const Configuration& at, Drive drive, const ForceSum& sum) = 0;
+  virtual bool conservative() const noexcept = 0;
+  virtual bool needs_velocity() const noexcept = 0;
 };
 
 }  // namespace perikit

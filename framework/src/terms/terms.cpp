@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -10,6 +11,7 @@
 #include "assembly/block_pattern.hpp"
 #include "body/interfaces.hpp"
 #include "cloud_balance/consistency.hpp"
+#include "core/symmetric_matrix.hpp"
 #include "families/fracture/fracture.hpp"
 #include "families/fracture/shared_bonds.hpp"
 #include "families/lattice/lattice_families.hpp"
@@ -76,32 +78,47 @@ void warn_of_energy(const TermParts& parts, ModelReport& report) {
 
 }  // namespace
 
-/// The blocks of a term whose tangent couples no two points: what it does to a motion of all points alike.
+namespace {
+
+/// K += the blocks of a term whose tangent couples no two points: what it does to a motion of all points alike. convex: without their negative
+/// curvatures, of a symmetric tangent. Returns as Term::forces does.
+std::int64_t add_point_blocks(Term& term, const Body& body, const Configuration& at, bool convex, BlockMatrix& K) {
+  const int d = body.dimension();
+  const auto n = static_cast<std::size_t>(d);
+  std::array<Field, 3> columns;
+  for (int e = 0; e < d; ++e) {
+    Field w = body.make_field(d);
+    std::fill_n(w.component(e), w.stride(), 1.0);
+    Field& column = columns[static_cast<std::size_t>(e)] = body.make_field(d);
+    if (const std::int64_t bad = term.tangent(at, w, {}, column); bad >= 0) return bad;
+  }
+  for (std::size_t r = 0; r < K.rows(); ++r) {
+    std::array<double, 9> block;
+    for (std::size_t c = 0; c < n; ++c)
+      for (std::size_t e = 0; e < n; ++e) block[c * n + e] = columns[e].component(static_cast<int>(c))[K.point[r]];
+    if (convex) make_semidefinite(block.data(), d);
+    for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
+      for (std::size_t k = 0; k < n * n && K.column[b] == static_cast<std::int32_t>(r); ++k) K.values[b * n * n + k] += block[k];
+  }
+  return -1;
+}
+
+}  // namespace
+
 class Terms::PointBlocks final : public Assembly {
  public:
-  PointBlocks(Term& term, const BlockRows& rows) : term_(term), rows_(rows) {}
+  PointBlocks(Term& term, const Body& body) : term_(term), body_(body) {}
   std::int64_t add(const Configuration& at, BlockMatrix& K) override {
-    const auto d = static_cast<std::size_t>(rows_.body().dimension());
-    Field w = rows_.body().make_field(static_cast<int>(d)), Kw = w;
-    for (std::size_t e = 0; e < d; ++e) {
-      fill(0, w);
-      fill(0, Kw);
-      std::fill_n(w.component(static_cast<int>(e)), w.stride(), 1.0);
-      const std::int64_t bad = term_.tangent(at, w, {}, Kw);
-      if (bad >= 0) return bad;
-      for (std::size_t r = 0; r < rows_.size(); ++r)
-        for (auto b = static_cast<std::size_t>(K.row_first[r]); b < static_cast<std::size_t>(K.row_first[r + 1]); ++b)
-          for (std::size_t c = 0; c < d && K.column[b] == static_cast<std::int32_t>(r); ++c)
-            K.values[(b * d + c) * d + e] += Kw.component(static_cast<int>(c))[rows_.point(r)];
-    }
-    return -1;
+    const bool symmetric = !term_.driven() || term_.driven()->conservative();
+    if (!symmetric) K.symmetric = false;
+    return add_point_blocks(term_, body_, at, K.convex && symmetric, K);
   }
   void bonds_changed() override {}
   std::size_t bytes() const noexcept override { return 0; }
 
  private:
   Term& term_;
-  const BlockRows& rows_;
+  const Body& body_;
 };
 
 /// One assembly for each term, over common block rows.
@@ -174,22 +191,22 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
 
 Terms::~Terms() = default;
 
-EvaluationStatus Terms::status(std::int64_t bad) const {
+EvaluationStatus Terms::status(std::int64_t bad, const Term* term) const {
   EvaluationStatus status;
   if (bad < 0) return status;
   const Body& body = parts_.families->body();
   const Point x = body.position(static_cast<std::size_t>(bad));
   status.point = body.number(static_cast<std::size_t>(bad));
   if (!body.material_ids().empty()) status.material = body.material_ids()[static_cast<std::size_t>(bad)];
-  status.description = fmt::format("point {} at ({:.6g}, {:.6g}, {:.6g})", status.point, x[0], x[1], x[2]);
+  status.description = fmt::format("({}) at point {} at ({:.6g}, {:.6g}, {:.6g})", (term ? *term : *terms_.front()).inadmissible(), status.point, x[0], x[1], x[2]);
   return status;
 }
 
 template <class Visit>
 EvaluationStatus Terms::each_term(Visit&& visit) {
-  std::int64_t bad = -1;
-  for (auto term = terms_.begin(); term != terms_.end() && bad < 0; ++term) bad = visit(**term);
-  return status(bad);
+  for (const auto& term : terms_)
+    if (const std::int64_t bad = visit(*term); bad >= 0) return status(bad, term.get());
+  return {};
 }
 
 int Terms::coupling_reach() const {
@@ -219,7 +236,9 @@ EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView 
   if (criterion_) criterion_->begin_forces();
   ExactSum stored;
   std::int64_t bad = -1;
+  const Term* met = nullptr;
   for (std::size_t t = 0; t < terms_.size() && bad < 0; ++t) {
+    met = terms_[t].get();
     const StatefulTerm* const remembers = terms_[t]->stateful();
     const bool dissipates = remembers && remembers->dissipates() && at.ends_step();
     if (energy || dissipates) energies_[t].assign(groups(), {});
@@ -231,7 +250,7 @@ EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView 
   }
   if (criterion_ && bad < 0) criterion_->end_forces(at.u());
   if (energy) *energy = total_over_ranks(stored);
-  return status(bad);
+  return status(bad, met);
 }
 
 EvaluationStatus Terms::forces(const Configuration& at, FieldView force, double* energy) {
@@ -361,7 +380,7 @@ Terms::Assemblies& Terms::assemblies() {
     assemblies_ = std::make_unique<Assemblies>(Assemblies{BlockRows(*parts_.families), {}, parts_.families->version()});
     for (const auto& term : terms_) {
       AssembledTerm* const assembled = term->assembled();
-      assemblies_->all.push_back(assembled ? assembled->make_assembly(assemblies_->rows) : std::make_unique<PointBlocks>(*term, assemblies_->rows));
+      assemblies_->all.push_back(assembled ? assembled->make_assembly(assemblies_->rows) : std::make_unique<PointBlocks>(*term, body()));
     }
     assemblies_->steps = coupling_reach();
   }
@@ -403,6 +422,52 @@ void Terms::history_restored() {
 }
 
 std::vector<HistoryPlace> Terms::history_points() const { return stateful() ? stateful()->history_points() : std::vector<HistoryPlace>(); }
+
+const Body& Terms::body() const noexcept { return parts_.families->body(); }
+
+bool Terms::constant_tangent() const noexcept {
+  return std::ranges::all_of(terms_, [](const auto& term) { return term->constant_tangent(); });
+}
+
+bool Terms::hold_points() const noexcept {
+  return std::ranges::any_of(terms_, [](const auto& term) { return !term->assembled(); });
+}
+
+EvaluationStatus Terms::tangent_of_points(const Configuration& at, ConstFieldView w, FieldView Kw) {
+  fill(0, Kw);
+  return each_term([&](Term& term) { return term.assembled() ? -1 : term.tangent(at, w, {}, Kw); });
+}
+
+EvaluationStatus Terms::add_stiffness_of_points(const Configuration& at, BlockMatrix& K) {
+  return each_term([&](Term& term) {
+    const bool symmetric = !term.driven() || term.driven()->conservative();
+    return term.assembled() || !symmetric ? -1 : add_point_blocks(term, body(), at, true, K);
+  });
+}
+
+bool Terms::driven(Drive drive) const noexcept {
+  return std::ranges::any_of(terms_, [&](const auto& term) { return term->driven() && term->driven()->driven(drive); });
+}
+
+bool Terms::driven_by_velocity() const noexcept {
+  return std::ranges::any_of(terms_, [](const auto& term) { return term->driven() && term->driven()->needs_velocity(); });
+}
+
+EvaluationStatus Terms::driven_forces(const Configuration& at, Drive drive, FieldView force, double& energy) {
+  fill(0, force);
+  ExactSum sum;
+  std::vector<GroupEnergy> energies;
+  const EvaluationStatus status = each_term([&](Term& term) {
+    DrivenTerm* const driven = term.driven();
+    if (!driven || !driven->driven(drive)) return std::int64_t{-1};
+    energies.assign(groups(), {});
+    const std::int64_t bad = driven->driven_forces(at, drive, {force, energies});
+    add_owned(energies, &GroupEnergy::stored, sum);
+    return bad;
+  });
+  energy = total_over_ranks(sum);
+  return status;
+}
 
 double Terms::accept() {
   if (!stateful()) return 0;

@@ -24,6 +24,8 @@
 namespace perikit {
 
 class BondCriterion;
+enum class Drive : int;
+class Body;
 class Families;
 struct CloudConsistency;
 struct Interfaces;
@@ -85,8 +87,9 @@ class Terms {
   EvaluationStatus sample(const Configuration& at, PointSamples& samples);
   /// The volumetric part of the tangent where the map is selective, else null. The terms must outlive it.
   std::unique_ptr<VolumetricRows> volumetric_rows() const;
-  /// That evaluation met this inadmissible point (field index), or none (-1).
-  EvaluationStatus status(std::int64_t bad) const;
+  /// That an evaluation of this term, or of the first one, met this inadmissible point (field index), or none (-1).
+  EvaluationStatus status(std::int64_t bad, const Term* term = nullptr) const;
+  const Body& body() const noexcept;
 
   /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
   bool has_gradients() const noexcept { return parts_.formulation.pairs == nullptr; }
@@ -94,6 +97,8 @@ class Terms {
   bool springs_alone() const noexcept { return parts_.formulation.pairs && !parts_.formulation.dilatation; }
   /// Whether forces are -dE/du, so that the tangent is symmetric.
   bool conservative() const noexcept { return parts_.formulation.force_state == ForceState::variational; }
+  /// Whether the tangent is the same at all displacements and times, as long as no bond fails.
+  bool constant_tangent() const noexcept;
   /// Condition number of each point's shape tensor (one component; infinite where singular; 0 for pair laws, which have none).
   Field shape_tensor_condition() const;
   /// Lost share of the family's influence by point, sum over broken bonds; 0 where intact (one component).
@@ -107,6 +112,19 @@ class Terms {
   /// The step that the last evaluation of forces ended is done, or given up: see Problem. What laws dissipated in it, over all ranks [J].
   double accept();
   void revert();
+
+  /// Whether something acts on points one by one, as springs to the ground do; and Kw <- its part of the tangent action, fully overwritten.
+  bool hold_points() const noexcept;
+  EvaluationStatus tangent_of_points(const Configuration& at, ConstFieldView w, FieldView Kw);
+
+  /// K += what of it is symmetric, without negative curvatures: for preconditioners.
+  EvaluationStatus add_stiffness_of_points(const Configuration& at, BlockMatrix& K);
+
+  // What is driven: forces that do other work than their energy falls by (terms/term.hpp).
+  bool driven(Drive drive) const noexcept;
+  bool driven_by_velocity() const noexcept;
+  /// force <- those forces alone [N], fully overwritten; their energy over all ranks -> energy.
+  EvaluationStatus driven_forces(const Configuration& at, Drive drive, FieldView force, double& energy);
 
   // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
   /// Lowers the integrity of bonds that are beyond their limit, and recomputes what depends on them. To be called after

@@ -18,13 +18,13 @@
 
 namespace perikit {
 
-enum class Kind { kinematics, stabilization, material, damage, influence, integrator };
+enum class Kind { kinematics, stabilization, material, damage, influence, term, integrator };
 
-/// "kinematics", "stabilization", "material", "damage", "influence", "integrator".
+/// "kinematics", "stabilization", "material", "damage", "influence", "term", "integrator".
 std::string_view name(Kind kind) noexcept;
 std::optional<Kind> kind_from_name(std::string_view name) noexcept;
-inline constexpr std::array all_kinds{Kind::kinematics, Kind::stabilization, Kind::material,
-                                      Kind::damage,     Kind::influence,     Kind::integrator};
+inline constexpr std::array all_kinds{Kind::kinematics, Kind::stabilization, Kind::material,  Kind::damage,
+                                      Kind::influence,  Kind::term,          Kind::integrator};
 
 enum class ParameterType {
   number,       ///< a float or integer, finite

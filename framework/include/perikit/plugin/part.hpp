@@ -23,6 +23,7 @@ class PartFactory {
   virtual std::unique_ptr<Material> material(const PartValues&) const = 0;
   virtual std::unique_ptr<Damage> damage(const PartValues&) const = 0;
   virtual std::unique_ptr<InfluenceFunction> influence(const PartValues&) const = 0;
+  virtual std::unique_ptr<PointTerm> term(const PartValues&) const = 0;
   virtual std::unique_ptr<Integrator> integrator(const PartValues&) const = 0;
 };
 
@@ -79,6 +80,7 @@ class Registrar {
   virtual void material(PartDescription, Factory<Material>) = 0;
   virtual void damage(PartDescription, Factory<Damage>) = 0;
   virtual void influence(PartDescription, Factory<InfluenceFunction>) = 0;
+  virtual void term(PartDescription, Factory<PointTerm>) = 0;
   virtual void integrator(PartDescription, Factory<Integrator>) = 0;
 };
 

@@ -20,6 +20,7 @@ class Stabilization;
 class Material;
 class Damage;
 class InfluenceFunction;
+class PointTerm;
 class Integrator;
 
 namespace detail {
@@ -33,7 +34,9 @@ consteval bool check_part() {
   constexpr bool derived = std::is_base_of_v<Interface, Part>;
   static_assert(derived || !std::same_as<Interface, Material>,
                 "the class is no Material: a law becomes one as std::make_unique<LawMaterial<MyLaw>>() (perikit/sdk/law_material.hpp)");
-  static_assert(derived || std::same_as<Interface, Material>,
+  static_assert(derived || !std::same_as<Interface, PointTerm>,
+                "the class is no PointTerm: a law becomes one as std::make_unique<LawTerm<MyLaw>>() (perikit/sdk/law_term.hpp)");
+  static_assert(derived || std::same_as<Interface, Material> || std::same_as<Interface, PointTerm>,
                 "the class is no part of the kind that it is registered as: derive it, as in class PartName final : public InfluenceFunction");
   if constexpr (derived) {
     constexpr bool whole = !std::is_abstract_v<Part>;
@@ -68,6 +71,9 @@ consteval bool check_part() {
                   "`void integrity(const IntegrityBatch& batch) const noexcept override`");
     static_assert(whole || !std::same_as<Interface, InfluenceFunction>,
                   "an influence function needs `void evaluate(std::span<const double> r, std::span<double> omega) const override`");
+    static_assert(whole || !std::same_as<Interface, PointTerm>,
+                  "a term needs `TermTraits traits() const noexcept override` and "
+                  "`Status evaluate(int dimension, const TermBatch& batch) const noexcept override`");
     static_assert(whole || !std::same_as<Interface, Integrator>,
                   "an integrator needs `IntegratorTraits traits() const noexcept override` and `void run(Problem& problem, Observer& observer) override`");
   }

@@ -16,8 +16,8 @@ namespace perikit {
 class ByteReader;
 class ByteWriter;
 
-/// Totals over the body [J]; external_work is what boundaries and loads have put in. dissipated: by bonds that failed and by laws, whose
-/// part is dissipated_by_laws.
+/// Totals over the body [J]; external_work is what boundaries and loads have put in. dissipated: by bonds that failed, by laws and by
+/// terms; the part of the latter two is dissipated_by_laws.
 struct Energies {
   double strain = 0, kinetic = 0, external_work = 0, dissipated = 0, dissipated_by_laws = 0;
 };

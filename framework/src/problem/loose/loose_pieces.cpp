@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/symmetric_matrix.hpp"
+#include "perikit/core/field_operations.hpp"
 #include "perikit/core/rank_values.hpp"
 
 namespace perikit {
@@ -82,6 +83,33 @@ void find_motions(const Body& body, ConstFieldView u, std::vector<LoosePiece>& p
   }
 }
 
+/// squares += the products of the forces by which terms that act on points resist the motions, in parts of the largest.
+void add_resistance(const Body& body, Terms& terms, const Configuration& at, const std::vector<LoosePiece>& pieces, std::vector<Products>& squares) {
+  const int d = body.dimension();
+  std::array<Field, most_motions> forces;
+  double largest = 0;
+  for (int i = 0; i < motions_of(d); ++i) {
+    Field w = body.make_field(d);
+    for (const LoosePiece& piece : pieces)
+      for (const std::int32_t p : piece.points) {
+        if (static_cast<std::size_t>(i) >= piece.motions.size()) break;
+        const Point motion = piece.at(piece.motions[static_cast<std::size_t>(i)], d, place(body, at.u(), p));
+        for (int c = 0; c < d; ++c) w.component(c)[p] = motion[static_cast<std::size_t>(c)];
+      }
+    Field& force = forces[static_cast<std::size_t>(i)] = body.make_field(d);
+    if (!terms.tangent_of_points(at, w, force).ok()) fill(0, force);   // the first evaluation of forces says so
+    largest = std::max(largest, largest_magnitude(force));
+  }
+  if (!(largest > 0)) return;
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    const std::size_t n = pieces[k].motions.size();
+    for (const std::int32_t p : pieces[k].points)
+      for (int c = 0; c < d; ++c)
+        for (std::size_t i = 0; i < n; ++i)
+          for (std::size_t j = 0; j < n; ++j) squares[k][i * n + j] += forces[i].component(c)[p] / largest * (forces[j].component(c)[p] / largest);
+  }
+}
+
 /// Keeps the motions that violate none of the conditions, of whose values at the motions these are the products.
 void keep_free(const Products& squares, LoosePiece& piece) {
   const auto n = static_cast<int>(piece.motions.size());
@@ -139,7 +167,7 @@ std::string names(const std::vector<LoosePiece>& pieces, const Body& body) {
   return others <= 0 ? first : fmt::format("{} and {} smaller or equal one{}", first, others, others == 1 ? "" : "s");
 }
 
-std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& problem, ConstFieldView u) {
+std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& problem, Terms& terms, ConstFieldView u) {
   const Body& body = families.body();
   const int d = body.dimension();
   const Sources sources(body, problem.images());
@@ -175,6 +203,10 @@ std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& pro
         return piece.at(motion, d, place(body, u, q))[e] -
                sources.sign.component(c)[q] * piece.at(motion, d, place(body, u, source(q)))[e];
       });
+  if (terms.hold_points()) {
+    constexpr double end = 1;   // of the load parameter
+    for (const double time : {problem.state().time, end}) add_resistance(body, terms, {u, time}, pieces, squares);
+  }
   add_up(pieces, squares.front().size(), {squares.front().data(), squares.front().size() * squares.size()});
   for (std::size_t k = 0; k < pieces.size(); ++k) keep_free(squares[k], pieces[k]);
   std::erase_if(pieces, [](const LoosePiece& piece) { return piece.motions.empty(); });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "problem/loose/pieces.hpp"
+#include "terms/terms.hpp"
 
 namespace perikit {
 
@@ -32,8 +33,9 @@ struct LoosePiece : Piece {
 /// All of them, on whatever rank, in words; empty: none. All ranks must call it, and everything below.
 std::string names(const std::vector<LoosePiece>& pieces, const Body& body);
 
-/// Those of which this rank has points, the largest first, at the displacement u as the terms see it.
-std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& problem, ConstFieldView u);
+/// Those of which this rank has points, the largest first, at the displacement u as the terms see it. Terms that act on points hold them
+/// where they resist a motion, now or at the end of the run.
+std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& problem, Terms& terms, ConstFieldView u);
 
 /// The first piece of all that `force` [N] moves: its share along the free motions is more than rounding leaves of it. Null on ranks
 /// that have not its first point.

@@ -21,16 +21,17 @@ std::vector<std::int32_t> points_of(const std::vector<LoosePiece>& pieces) {
 
 }  // namespace
 
-WeakSprings::WeakSprings(const Families& families, Problem& problem, double share)
+WeakSprings::WeakSprings(const Families& families, Problem& problem, Terms& terms, double share)
     : families_(families),
       problem_(problem),
+      terms_(terms),
       share_(share),
       loose_(families.body().stride(), 0),
       anchor_(share > 0 ? problem.state().declare("weak_spring_anchor") : FieldView{}) {}
 
 void WeakSprings::find(ConstFieldView u, bool fresh) {
   // A rank without others does not know what holds its part beyond it.
-  if (communicator().complete()) pieces_ = find_loose_pieces(families_, problem_, u);
+  if (communicator().complete()) pieces_ = find_loose_pieces(families_, problem_, terms_, u);
   points_ = points_of(pieces_);
   any_ = communicator().largest(pieces_.empty() ? 0 : 1) > 0;
   std::vector<std::uint8_t> now(loose_.size(), 0);

@@ -14,8 +14,8 @@ namespace perikit {
 /// must call everything but add_tangent and add_to.
 class WeakSprings {
  public:
-  /// Both must outlive this.
-  WeakSprings(const Families& families, Problem& problem, double share);
+  /// All must outlive this.
+  WeakSprings(const Families& families, Problem& problem, Terms& terms, double share);
 
   /// Looks for the pieces at u, as the terms see it. fresh: points that are loose now and were not are anchored where they are.
   void find(ConstFieldView u, bool fresh);
@@ -38,6 +38,7 @@ class WeakSprings {
 
   const Families& families_;
   Problem& problem_;
+  Terms& terms_;
   double share_;
   std::vector<LoosePiece> pieces_;
   bool any_ = false;

@@ -50,7 +50,7 @@ void ResolvedWriter::lines(const ParameterTable& parameters, const ParameterValu
 
 void ResolvedWriter::part(const PartValues& part) {
   const std::string section(name(part.kind));
-  header(section);
+  header(section, part.kind == Kind::term);
   line("type", toml_string(part.type));
   lines(part_table(parts_.describe(part.kind, part.type), part.kind, section), part.values);
 }

@@ -37,7 +37,7 @@ toml::table parse_toml(const std::string& text, const std::string& file) {
 
 ParameterTable part_table(const PartDescription& description, Kind kind, const std::string& path) {
   ParameterTable table = description.parameters;
-  if (path != name(kind)) return table;
+  if (path != name(kind) && kind != Kind::term) return table;
   const ParameterTable common = common_part_parameters(kind);
   for (const Parameter& own : common.parameters()) {
     if (!table.find(own.name)) table.add(own.type, own.name, own.unit, own.text) = own;

@@ -11,7 +11,7 @@
 
 namespace perikit {
 
-/// A part's table with the keys that the framework adds to the scene's own kinematics (stabilization) and damage (no_fail, gradual).
+/// A part's table with the keys that the framework adds to the scene's own kinematics (stabilization) and damage (no_fail, gradual), and to terms (set).
 ParameterTable part_table(const PartDescription& description, Kind kind, const std::string& path);
 
 class TomlReader {

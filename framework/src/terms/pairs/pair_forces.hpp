@@ -25,6 +25,7 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   std::int64_t forces(const Configuration& at, const Region& region, const ForceSum& sum) override;
   std::int64_t tangent(const Configuration& at, ConstFieldView w, const Region& region, FieldView Kw) override;
   void report(ModelReport& report) const override;
+  std::string_view inadmissible() const noexcept override { return "a bond of zero or non-finite length"; }
   AssembledTerm* assembled() noexcept override { return this; }
   SampledTerm* sampled() noexcept override { return this; }
   BreakableTerm* breakable() noexcept override { return this; }

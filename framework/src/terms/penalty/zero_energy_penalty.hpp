@@ -23,6 +23,7 @@ class ZeroEnergyPenalty : public Term, public AssembledTerm, public SampledTerm,
     return -1;
   }
   void report(ModelReport& report) const final;
+  bool constant_tangent() const noexcept final { return true; }
   AssembledTerm* assembled() noexcept final { return this; }
   SampledTerm* sampled() noexcept final { return this; }
   BreakableTerm* breakable() noexcept final { return this; }
