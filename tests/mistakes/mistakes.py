@@ -32,6 +32,8 @@ MISTAKES = {
     "a stabilization without penalty": ("stabilization", "void penalty(const PenaltyPoint& x, double* M) const noexcept override", "void stiffness(const PenaltyPoint& x, double* M) const noexcept"),
     "a kinematics with other arguments": ("kinematics", "double* g, std::size_t stride) const noexcept override", "double* g, int stride) const noexcept"),
     "a criterion without const": ("damage", "void integrity(const IntegrityBatch& b) const noexcept override", "void integrity(const IntegrityBatch& b)"),
+    "a term registered without LawTerm": ("term", "std::make_unique<LawTerm<PartName>>()", "std::make_unique<PartName>()"),
+    "an energy of a term without const": ("term", "const K& k) const noexcept {", "const K& k) noexcept {"),
     "a parameter without a unit": ("influence", 'table.number("width", "-", ', 'table.number("width", '),
     "a function that takes the values alone": ("influence", "[](const ParameterValues& values, const PartFactory&)", "[](const ParameterValues& values)"),
 }
@@ -66,7 +68,7 @@ def messages_of_page():
 def main():
     FOLDER.mkdir(parents=True, exist_ok=True)
     command, expected = flags(), messages_of_page()
-    templates = {kind: (ROOT / f"framework/templates/{kind}/plugin.cpp").read_text() for kind in ("material", "influence", "stabilization", "kinematics", "damage", "integrator")}
+    templates = {kind: (ROOT / f"framework/templates/{kind}/plugin.cpp").read_text() for kind in ("material", "influence", "stabilization", "kinematics", "damage", "term", "integrator")}
     # What all of them read is read once.
     includes = sorted({line for text in templates.values() for line in re.findall(r"^#include.*", text, re.MULTILINE)})
     (FOLDER / "parts.hpp").write_text("\n".join(includes) + "\n")
