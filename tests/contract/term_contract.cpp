@@ -286,9 +286,9 @@ TEST_CASE("term: in a body, the assembled tangent is the tangent action, and sam
       deform(body, u, 15, 0.05);
       const Field w = random_direction(problem, 16);
       const Configuration at(u, 0.3);
-      REQUIRE(problem.tangent_action(at, w, Kw).ok());
+      REQUIRE(problem.tangent_action({at, 0}, w, Kw).ok());
       BlockMatrix K;
-      REQUIRE(problem.assemble_tangent(at, K).ok());
+      REQUIRE(problem.assemble_tangent({at, 0}, K).ok());
       const auto n = static_cast<std::size_t>(d);
       double worst = 0;
       for (std::size_t r = 0; r < K.rows(); ++r)
@@ -302,9 +302,9 @@ TEST_CASE("term: in a body, the assembled tangent is the tangent action, and sam
       CHECK_MESSAGE(worst <= 1e-12 * largest(body, Kw), "assembled and applied tangent differ by ", worst);
       double energy = 0, sampled = 0;
       Field f = problem.make_field();
-      REQUIRE(problem.evaluate_forces(at, f, &energy).ok());
+      REQUIRE(problem.evaluate_forces({at, 0}, f, &energy).ok());
       PointSamples samples;
-      REQUIRE(problem.terms().sample(at, samples).ok());
+      REQUIRE(problem.terms().sample({at, 0}, samples).ok());
       for (const std::int32_t p : body.owned()) sampled += samples.strain_energy_density.data()[p] * body.volume(static_cast<std::size_t>(p));
       CHECK_MESSAGE(std::abs(sampled - energy) <= 1e-11 * std::abs(energy), "samples hold ", sampled, " J of ", energy);
     }

@@ -1,7 +1,7 @@
 #include <memory>
 
 #include "perikit/sdk/law_term.hpp"
-#include "perikit/sdk/plugin.hpp"
+#include "perikit/term.hpp"
 
 using namespace perikit;
 
