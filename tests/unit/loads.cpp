@@ -97,12 +97,12 @@ TEST_CASE("traction: a set away from the face is refused") {
 namespace {
 
 /// Forces and their first moments less those of a traction: components x, y over 1, x, y.
-using Work = std::array<std::array<double, 3>, 2>;
+using VirtualWork = std::array<std::array<double, 3>, 2>;
 
-Work virtual_work(Simulation& simulation) {
+VirtualWork virtual_work(Simulation& simulation) {
   BodyProblem& problem = simulation.problem();
   problem.loads().evaluate(0.0, problem.state().external_force());
-  Work work{};
+  VirtualWork work{};
   for (const std::int32_t p : problem.body().internal()) {
     const Point x = problem.body().position(static_cast<std::size_t>(p));
     for (std::size_t c = 0; c < 2; ++c) {
@@ -128,7 +128,7 @@ TEST_CASE("traction that varies: the virtual work of every affine motion is exac
     INFO(kinematics);
     const auto simulation = plate("x > 5.5", 0.0, "traction = [\"3 + 2*y + y^2\", \"y - 1\"]\nface = \"+x\"", kinematics);
     // Some kinematics feel the opposite face, four horizons away.
-    const Work work = virtual_work(*simulation), uniform = virtual_work(*plate("x > 5.5", 0.0, "traction = [1, 0]\nface = \"+x\"", kinematics));
+    const VirtualWork work = virtual_work(*simulation), uniform = virtual_work(*plate("x > 5.5", 0.0, "traction = [1, 0]\nface = \"+x\"", kinematics));
     for (const auto& [found, wanted] :
          {std::pair(work[0][0], I0), {work[0][1], 6 * I0}, {work[0][2], I1}, {work[1][0], J0}, {work[1][1], 6 * J0}, {work[1][2], J1},
           {uniform[0][0], 10.0}, {uniform[0][1], 60.0}, {uniform[0][2], 25.0}})
@@ -171,7 +171,7 @@ TEST_CASE("pressure that varies: force and moment of a hydrostatic wall, and of 
       CHECK(force == doctest::Approx(-7 * 12.5 * 2).epsilon(1e-12));
       CHECK(moment == doctest::Approx(-7 * 2 * (5 * 12.5 - 125.0 / 3)).epsilon(1e-12));
       if (*follower) continue;
-      const Work work = virtual_work(*plate("x > -1", 0.0, pressure, kinematics));
+      const VirtualWork work = virtual_work(*plate("x > -1", 0.0, pressure, kinematics));
       CHECK(work[1][0] == doctest::Approx(7 * 30.0 * 2).epsilon(1e-12));   // buoyancy
       CHECK(work[1][1] == doctest::Approx(7 * 30.0 * 2 * 3).epsilon(1e-12));
       CHECK(std::abs(work[0][0]) < 1e-10);
@@ -183,16 +183,16 @@ TEST_CASE("tractions and pressures on a part of the surface of a lattice: force 
     for (const char* kinematics : with_faces) {
     INFO(kinematics);
     const double area = 2 * 3.5, middle = 1.5 + 1.75, square = 2 * (125.0 - 27.0 / 8) / 3;   // of y^2
-    const Work uniform = virtual_work(*plate("y > 1.4", 0.0, "traction = [3, 1]\nface = \"+x\"", kinematics));
-    const Work linear = virtual_work(*plate("y > 1.4", 0.0, "traction = [\"2 + y\", 0]\nface = \"+x\"", kinematics));
-    const Work pressure = virtual_work(*plate("y > 1.4", 0.0, "pressure = 3\nface = \"+x\"", kinematics));
+    const VirtualWork uniform = virtual_work(*plate("y > 1.4", 0.0, "traction = [3, 1]\nface = \"+x\"", kinematics));
+    const VirtualWork linear = virtual_work(*plate("y > 1.4", 0.0, "traction = [\"2 + y\", 0]\nface = \"+x\"", kinematics));
+    const VirtualWork pressure = virtual_work(*plate("y > 1.4", 0.0, "pressure = 3\nface = \"+x\"", kinematics));
     for (const auto& [found, wanted] :
          {std::pair(uniform[0][0], 3 * area), {uniform[0][1], 3 * area * 6}, {uniform[0][2], 3 * area * middle}, {uniform[1][0], area}, {uniform[1][1], area * 6}, {uniform[1][2], area * middle},
           {linear[0][0], area * (2 + middle)}, {linear[0][1], area * (2 + middle) * 6}, {linear[0][2], 2 * area * middle + square},
           {pressure[0][0], -3 * area}, {pressure[0][1], -3 * area * 6}, {pressure[0][2], -3 * area * middle}})
       CHECK(found == doctest::Approx(wanted).epsilon(1e-12));
     // A corner: 3 of the right side, 3 of the upper one (x > 3, y > 2), each with its own pressure.
-    const Work corner = virtual_work(*plate("x > 3 && y > 2", 0.0, "pressure = \"1 + 2*y\"", kinematics));
+    const VirtualWork corner = virtual_work(*plate("x > 3 && y > 2", 0.0, "pressure = \"1 + 2*y\"", kinematics));
     for (const auto& [found, wanted] : {std::pair(corner[0][0], -2 * (3 + 21.0)), {corner[0][1], -2 * (3 + 21.0) * 6}, {corner[0][2], -2 * (10.5 + 2 * 39.0)}, {corner[1][0], -2 * 3 * 11.0},
                                         {corner[1][1], -2 * 3 * 11.0 * 4.5}, {corner[1][2], -2 * 3 * 11.0 * 5}})
       CHECK(found == doctest::Approx(wanted).epsilon(1e-12));
@@ -204,9 +204,9 @@ TEST_CASE("pressure that varies: force and moments on a cloud under water") {
     if (std::string(kinematics).find("ordinary") != std::string::npos || std::string(kinematics).find("bond_based") != std::string::npos) continue;   // refused
     INFO(kinematics);
     const auto simulation = plate("x > -1", 0.2, "pressure = \"7*(5 - y) + 2*x\"", kinematics);
-    const Work work = virtual_work(*simulation);
+    const VirtualWork work = virtual_work(*simulation);
     // - int of d(p x_b)/dx_c over the body.
-    Work wanted{};
+    VirtualWork wanted{};
     const Body& body = simulation->problem().body();
     for (const std::int32_t index : body.internal()) {
       const auto p = static_cast<std::size_t>(index);
@@ -245,7 +245,7 @@ TEST_CASE("traction: a homogeneous stress in a thin body is in equilibrium with 
       // Under selective kinematics the mean stress has area vectors of its own, and how much of a traction is mean stress depends on the
       // law: with a Poisson's ratio of 0 it is a third, as loads take it. Along free sides what is left has no work in any affine motion.
       const bool selective = name.find("selective") != std::string::npos;
-      Work work{};
+      VirtualWork work{};
       for (const std::int32_t p : body.internal())
         for (std::size_t c = 0; c < 2; ++c) {
           const double left = force.component(static_cast<int>(c))[p] + problem.state().external_force().component(static_cast<int>(c))[p];
