@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "tests/contract/bonds_that_fail.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/contract/reference_body.hpp"
 

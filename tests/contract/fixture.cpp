@@ -1,6 +1,5 @@
 #include "tests/contract/fixture.hpp"
 
-#include <doctest/doctest.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -94,13 +93,6 @@ std::string Case::label() const {
 Formulation formulation_of(const Example& example) {
   Registry& registry = subject().registry;
   return make_formulation(registry.kinematics(*parse_part(Kind::kinematics, example.part, example.table, registry)));
-}
-
-bool bonds_may_fail(const Example& example, int dimension) {
-  if (formulation_of(example).force_state == ForceState::variational) return true;
-  const std::string damage = "[damage]\ntype = \"critical_stretch\"\nstretch = 0.6\n";
-  CHECK_THROWS_WITH_AS(build(scene_text({.dimension = dimension, .conditions = damage}, kinematics_table(example))), doctest::Contains("damage: found with"), InputError);
-  return false;
 }
 
 bool Case::conservative() const { return formulation_of(example).force_state == ForceState::variational; }

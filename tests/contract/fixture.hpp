@@ -71,8 +71,6 @@ struct Case {
   /// Whether the part declares its forces as -dE/du.
   bool conservative() const;
 };
-/// Whether forces are -dE/du, so that bonds may fail; scenes with the others are refused.
-bool bonds_may_fail(const Example& example, int dimension);
 /// Every kinematics in every space, on lattices and clouds, intact and cracked.
 std::vector<Case> cases();
 /// The bodies with tongues, in the plane and in space.

@@ -13,6 +13,7 @@
 #include <optional>
 #include <set>
 
+#include "tests/contract/bonds_that_fail.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/contract/reference_body.hpp"
 #include "tests/kit/derivative.hpp"
@@ -23,10 +24,6 @@ using namespace perikit;
 using namespace perikit::contract;
 
 namespace {
-
-// What a criterion says is taken at its word here: bonds fail whatever that does to the energy, but for the case of the second
-// law.
-const char* const limit = "[damage]\ntype = \"critical_stretch\"\nsecond_law = false\nstretch = 0.6\n";
 
 /// Height of a plane through the whole body, between two layers of points of a lattice.
 double plane_height(const Body& body) {
@@ -162,7 +159,7 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         BodyOptions options{.dimension = d, .cloud = cloud, .two_materials = !formulation_of(example).selective()};
         const auto whole = build(scene_text(options, kinematics_table(example)));
         const double height = plane_height(whole->problem().body());
-        options.conditions = limit;
+        options.conditions = limit_of_stretch;
         const auto failing = build(scene_text(options, kinematics_table(example)));
         options.conditions = crack_text(whole->problem().body());
         const auto cut = build(scene_text(options, kinematics_table(example)));
@@ -599,7 +596,7 @@ TEST_CASE("kinematics: forces and energies that are renewed near failed bonds ar
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!bonds_may_fail(example, d)) continue;
         // Large enough that most points lie far from the place where bonds fail.
-        BodyOptions options{.dimension = d, .cloud = cloud, .cells = d == 1 ? 400 : 60, .conditions = limit};
+        BodyOptions options{.dimension = d, .cloud = cloud, .cells = d == 1 ? 400 : 60, .conditions = limit_of_stretch};
         const auto simulation = build(scene_text(options, kinematics_table(example)));
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
@@ -650,7 +647,7 @@ TEST_CASE("kinematics: stretches are those of bonds between neighbours that have
   for (const bool cloud : {false, true})
     for (const int d : {1, 2, 3}) {
       INFO(d, "D ", cloud ? "cloud" : "lattice");
-      const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .cells = 9, .conditions = limit}, "type = \"baqp\""));
+      const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .cells = 9, .conditions = limit_of_stretch}, "type = \"baqp\""));
       BodyProblem& problem = simulation->problem();
       const Body& body = problem.body();
       const FieldView u = problem.state().displacement();
@@ -680,7 +677,7 @@ TEST_CASE("kinematics: points without bonds are free masses") {
       for (const int d : {1, 2, 3}) {
         INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", cloud ? "cloud" : "lattice");
         if (!bonds_may_fail(example, d)) continue;
-        const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit}, kinematics_table(example)));
+        const auto simulation = build(scene_text({.dimension = d, .cloud = cloud, .conditions = limit_of_stretch}, kinematics_table(example)));
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         set_field(body, problem.state().displacement(), [](const Point& x) { return Point{5 * x[0], 5 * x[1], 5 * x[2]}; });
@@ -704,7 +701,7 @@ TEST_CASE("kinematics: a scene without damage pays nothing") {
       if (!bonds_may_fail(example, 2)) continue;
       BodyOptions options{.dimension = 2, .cloud = cloud};
       const auto plain = build(scene_text(options, kinematics_table(example)));
-      options.conditions = limit;
+      options.conditions = limit_of_stretch;
       const auto failing = build(scene_text(options, kinematics_table(example)));
       CHECK(plain->problem().terms().report().bytes < failing->problem().terms().report().bytes);
       CHECK(plain->problem().terms().update_bonds({plain->problem().state().displacement(), 0}).changed == 0);
