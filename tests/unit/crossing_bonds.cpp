@@ -168,7 +168,8 @@ TEST_CASE("critical_energy: clouds, jittered or lattices that are turned, take G
     const Formulation f = formulation(kinematics);
     for (int d = 1; d <= 3; ++d)
       for (int m = 2; m <= (d == 3 ? 3 : 6); ++m)
-        for (const auto& [degrees, jitter] : {std::pair(0.0, 0.2), std::pair(22.5, 0.0), std::pair(45.0, 0.0)}) {
+        for (const auto& turned : {std::pair(0.0, 0.2), std::pair(22.5, 0.0), std::pair(45.0, 0.0)}) {
+          const double degrees = turned.first, jitter = turned.second;
           if (d == 1 && degrees > 0) continue;
           const Body body = cloud(d, m, degrees, jitter);
           for (const Kernel& kernel : kernels) {

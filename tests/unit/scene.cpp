@@ -268,8 +268,8 @@ TEST_CASE("every section has a table, and every default of it is allowed") {
   for (const auto& [section, table] : scene_sections()) {
     load |= section == "load";
     for (const Parameter& parameter : table.parameters()) {
-      CAPTURE(section);
-      CAPTURE(parameter.name);
+      const std::string key = section + "." + parameter.name;
+      CAPTURE(key);
       CHECK(!parameter.text.empty());
       CHECK(!allowed(parameter).empty());
     }

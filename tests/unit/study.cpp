@@ -260,7 +260,8 @@ TEST_CASE("reductions over the history") {
 }
 
 TEST_CASE("a logarithmic axis has labelled tics, also where it covers less than a decade") {
-  for (const auto& [least, most] : {std::pair{0.398, 0.492}, {0.005, 0.02}, {0.9, 1.1}, {1e-9, 9e-8}, {3.0, 3.001}}) {
+  for (const auto& ends : {std::pair{0.398, 0.492}, {0.005, 0.02}, {0.9, 1.1}, {1e-9, 9e-8}, {3.0, 3.001}}) {
+    const double least = ends.first, most = ends.second;
     const std::vector<double> tics = logarithmic_tics(least, most);
     const auto shown = std::ranges::count_if(tics, [&](double tic) { return tic >= least && tic <= most; });
     CHECK_MESSAGE((shown >= 2 && shown <= 8), shown, " tics from ", least, " to ", most);
