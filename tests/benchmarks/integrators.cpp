@@ -13,15 +13,15 @@
 #include "plugin/registry.hpp"
 #include "run/simulation.hpp"
 #include "tests/benchmarks/timed_problem.hpp"
+#include "tests/kit/observers.hpp"
 
 using namespace perikit;
 using namespace perikit::benchmarks;
 
 namespace {
 
-class Counter final : public Observer {
+class Counter final : public test::Silent {
  public:
-  bool wants_sample(std::int64_t, double) override { return false; }
   void step_done(const StepReport& report) override {
     iterations += report.iterations;
     reached = report.time;

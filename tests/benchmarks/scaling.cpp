@@ -15,15 +15,15 @@
 #include "perikit/core/parallel.hpp"
 #include "plugin/registry.hpp"
 #include "run/simulation.hpp"
+#include "tests/kit/observers.hpp"
 
 using namespace perikit;
 
 namespace {
 
 /// The fastest step, by the wall and by the processor (all threads together).
-class FastestStep final : public Observer {
+class FastestStep final : public test::Silent {
  public:
-  bool wants_sample(std::int64_t, double) override { return false; }
   void step_done(const StepReport& report) override {
     const auto time = std::chrono::steady_clock::now();
     const std::clock_t processor_time = std::clock();
@@ -34,7 +34,6 @@ class FastestStep final : public Observer {
     last_ = time;
     last_processor_ = processor_time;
   }
-  void log(std::string_view) override {}
   double wall = INFINITY, processor = INFINITY;
 
  private:

@@ -4,6 +4,7 @@
 
 #include "perikit/problem/motion.hpp"
 #include "perikit/sdk/stable_step.hpp"
+#include "tests/kit/observers.hpp"
 #include "tests/stability/measures.hpp"
 
 namespace perikit::stability {
@@ -11,7 +12,7 @@ namespace perikit::stability {
 namespace {
 
 /// The total energy of every so many steps, and the sign changes of the displacement of one point.
-class EnergyWatcher final : public Observer {
+class EnergyWatcher final : public test::Silent {
  public:
   EnergyWatcher(BodyProblem& problem, std::int64_t every)
       : problem_(problem), every_(every), end_(problem.body().internal().back()) {}
@@ -23,7 +24,6 @@ class EnergyWatcher final : public Observer {
     signs_ += u * last_ < 0;
     last_ = u;
   }
-  void log(std::string_view) override {}
 
   std::int64_t signs() const { return signs_; }
   Drift drift() const {

@@ -10,6 +10,7 @@
 
 #include "core/eigen.hpp"
 #include "tests/contract/fixture.hpp"
+#include "tests/kit/observers.hpp"
 
 namespace perikit::stability {
 
@@ -107,7 +108,7 @@ Eigen::VectorXd roughness(const Eigen::MatrixXd& modes, const Eigen::MatrixXd& x
 }
 
 /// Watches the kinetic energy.
-class Watcher final : public Observer {
+class Watcher final : public test::Silent {
  public:
   explicit Watcher(BodyProblem& problem) : problem_(problem) {}
   bool wants_sample(std::int64_t, double) override { return true; }
@@ -116,7 +117,6 @@ class Watcher final : public Observer {
     if (report.step == 0) start_ = kinetic;
     most_ = std::isfinite(kinetic) ? std::max(most_, kinetic) : std::numeric_limits<double>::infinity();
   }
-  void log(std::string_view) override {}
   bool cancelled() const noexcept override { return most_ > 1e12 * start_; }
   double growth() const { return most_ / start_; }
 
