@@ -248,7 +248,8 @@ void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K, double mo
   companion_->limit_bulk(most_bulk);
   over_own(K, companion_of_terms_, [&](BlockMatrix& of_terms) {
     companion_->assemble(seen(u, seen_), of_terms);
-    terms().add_stiffness_of_points({u, state().time}, of_terms);   // where a point is inadmissible, forces say so
+    constexpr double end = 1;   // of the load parameter: the matrix does not depend on when it is made, and runs go on to the bit
+    terms().add_stiffness_of_points({u, end}, of_terms);   // where a point is inadmissible, forces say so
   });
 }
 
