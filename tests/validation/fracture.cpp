@@ -17,11 +17,11 @@ using namespace perikit::validation;
 namespace {
 
 /// What is missing in the balance at the end, and what bonds dissipated [J].
-struct Balance {
+struct RunEnergies {
   double work, dissipated, missing;
 };
 
-Balance run(Simulation& simulation) {
+RunEnergies run(Simulation& simulation) {
   const contract::Watch watch = contract::run(simulation);
   const Energies& e = watch.energies.back();
   return {e.external_work, e.dissipated, e.external_work - e.strain - e.kinetic - e.dissipated};
@@ -131,7 +131,7 @@ TEST_CASE("crack in a strip: what bonds set free follows from the forces that ar
     return load("fracture/strip.toml", {"kinematics=baqp", "integrator.end_time=2e-5", fmt::format("run.skip={}", skip)});
   };
   const auto found = scene("true"), anew = scene("false");
-  const Balance some = run(*found), every = run(*anew);
+  const RunEnergies some = run(*found), every = run(*anew);
   CHECK(some.dissipated > 0);
   CHECK(some.dissipated == doctest::Approx(every.dissipated).epsilon(1e-9));
   CHECK(found->problem().terms().bond_checks().failed == anew->problem().terms().bond_checks().failed);
@@ -151,7 +151,7 @@ TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {
                                                           "boundary=[{set=\"top\", velocity=[\"free\", 0.5, \"free\"]}, {set=\"bottom\", velocity=[\"free\", -0.5, \"free\"]}]"});
     BodyProblem& problem = simulation->problem();
     const double before = most_damage(problem, [](const Point& x) { return x[0] > 0.2e-3; });
-    const Balance balance = run(*simulation);
+    const RunEnergies balance = run(*simulation);
     CHECK(before == 0);
     CHECK(most_damage(problem, [](const Point& x) { return x[0] > 0.46e-3; }) > lip);
     CHECK(most_damage(problem, [](const Point& x) { return std::abs(x[1]) > 0.25e-3; }) < 0.1);
@@ -166,7 +166,7 @@ TEST_CASE("boundary tension: the energy balance holds to the end, whatever the n
     return load("partmann/boundary_tension.toml", std::move(more));
   };
   const auto simulation = scene({});
-  const Balance balance = run(*simulation);
+  const RunEnergies balance = run(*simulation);
   CHECK(balance.dissipated > 0);
   CHECK_MESSAGE(std::abs(balance.missing) <= 0.01 * balance.work, balance.missing, " J missing, work ", balance.work, " J");
   CHECK(most_damage(simulation->problem(), [](const Point& x) { return x[0] > 0.08; }) > 0.35);
@@ -295,7 +295,7 @@ TEST_CASE("a block that bursts: fragments fly on, momentum stays") {
     };
     const double scale = 300 * 2440 * 0.1 * 0.04 * 0.004;
     const std::array<double, 3> before = cloud ? std::array{momentum(0), momentum(1), momentum(2)} : std::array{scale, 0.0, 0.0};
-    const Balance balance = run(*simulation);
+    const RunEnergies balance = run(*simulation);
     for (int c = 0; c < 3; ++c) CHECK(std::abs(momentum(c) - before[static_cast<std::size_t>(c)]) <= 1e-10 * scale);
     const Field damage = problem.terms().damage();
     std::size_t fragments = 0;

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <string_view>
 
+#include "perikit/model/point_term.hpp"
 #include "perikit/body/influence.hpp"
 #include "scene/scene.hpp"
 #include "tests/contract/integrator_fixture.hpp"
@@ -55,6 +56,7 @@ class Counting final : public PartFactory {
   }
   std::unique_ptr<Damage> damage(const PartValues& part) const override { return registry().damage(part); }
   std::unique_ptr<InfluenceFunction> influence(const PartValues& part) const override { return registry().influence(part); }
+  std::unique_ptr<PointTerm> term(const PartValues& part) const override { return registry().term(part); }
   std::unique_ptr<Integrator> integrator(const PartValues& part) const override { return registry().integrator(part); }
   mutable Work work;
 };
