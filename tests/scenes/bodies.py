@@ -86,6 +86,9 @@ class Bodies(Draws):
         kind = self.random.choice(["hole", "hole", "ball", "notch", "plane"]) if self.dimension > 1 else "plane"
         if kind in ("hole", "ball"):
             radius = self.between(0.8, 1.8) * self.spacing if kind == "hole" else self.between(0.4, 0.55) * min(self.extent) * self.spacing
+            if self.maybe(0.3):   # about a corner or centre of a cell
+                at = [low + round(2 * (x - low) / self.spacing) * self.spacing / 2 for x, low in zip(at, self.lower)]
+                radius = max(1, round(2 * radius / self.spacing)) * self.spacing / 2
             centre = at if kind == "hole" else [0.5 * (low + high) for low, high in zip(self.lower, self.upper)]
             squares = " + ".join("(%s - (%.6g))^2" % pair for pair in zip(self.axes, centre))
             sign = "-" if kind == "hole" else ""
@@ -94,7 +97,10 @@ class Bodies(Draws):
         if kind == "notch":
             return "%s > %.6g || %s < %.6g || %s > %.6g" % ("y", self.lower[1] + self.between(0.2, 0.6) * self.extent[1] * self.spacing,
                                                             "x", at[0] - 0.6 * self.spacing, "x", at[0] + 0.6 * self.spacing)
-        return " + ".join("%.3g*(%s - (%.6g))" % (self.between(-1, 1), axis, low) for axis, low in zip(AXES, self.lower)) + " > %.6g" % (-0.3 * self.size)
+        slopes, height = [self.between(-1, 1) for _ in self.lower], -0.3 * self.size
+        if self.maybe(0.4) and max(abs(slope) for slope in slopes) > 0.25:   # through corners, centres and sides of cells
+            slopes, height = [round(2 * slope) / 2 for slope in slopes], round(2 * height / self.spacing) * self.spacing / 2
+        return " + ".join("%.3g*(%s - (%.6g))" % row for row in zip(slopes, AXES, self.lower)) + " > %.6g" % height
 
     def rows_of_axis(self, axis, kind):
         """Positions along an axis, each with the share of the body that is its own: in the middle of cells, of graded ones, or on the sides."""
