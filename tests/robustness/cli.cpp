@@ -11,6 +11,7 @@
 
 #include "output/recorder.hpp"
 #include "robustness/desk.hpp"
+#include "tests/kit/scene_text.hpp"
 
 using namespace perikit::test;
 
@@ -343,31 +344,9 @@ TEST_CASE("cli: a signal ends a run in order") {
 }
 
 TEST_CASE("cli: newton refuses a tangent that memory does not hold, with the numbers" * doctest::skip(unlimited_addresses)) {
-  const Desk desk(R"(format = 1
-[body]
-dimension = 2
-plane = "strain"
-lattice = { spacing = 1, lower = [0, 0], upper = [300, 300] }
-[sets]
-left = "x < 1"
-[family]
-horizon_ratio = 6.015
-[kinematics]
-type = "baqp"
-[material]
-type = "neo_hookean"
-shear_modulus = 1.0
-bulk_modulus = 2.0
-[[boundary]]
-set = "left"
-displacement = [0, 0]
-[[load]]
-set = "all"
-force = [0, 1]
-[integrator]
-type = "newton"
-linear_solver = "direct"
-)");
+  const Desk desk(SceneText{.upper = {300, 300}, .sets = "left = \"x < 1\"", .family = "horizon_ratio = 6.015",
+                            .further = "[[boundary]]\nset = \"left\"\ndisplacement = [0, 0]\n[[load]]\nset = \"all\"\nforce = [0, 1]",
+                            .integrator = "type = \"newton\"\nlinear_solver = \"direct\""});
   for (const std::string command : {"check scene.toml", "run scene.toml -o out --threads 1"}) {
     const Result failed = desk.perikit(command, "ulimit -v 1000000;");
     INFO(failed.err);

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/kit/messages.hpp"
 #include "unit/temporary_folder.hpp"
 
 namespace fs = std::filesystem;
@@ -85,8 +86,6 @@ inline std::string read(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
-
-inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 struct Result {
   int status;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "robustness/desk.hpp"
+#include "tests/kit/scene_text.hpp"
 
 using namespace perikit::test;
 
@@ -155,33 +156,10 @@ TEST_CASE("questionable: a box that is no multiple of the spacing") {
 }
 
 TEST_CASE("questionable: laws for small strains, and penalties that do not turn, in bodies that leave small strains and rotations") {
-  const std::string spinning = R"(format = 1
-[body]
-dimension = 2
-plane = "strain"
-[body.lattice]
-spacing = 1.0
-lower = [-4, -2]
-upper = [4, 2]
-[family]
-horizon_ratio = 2.015
-[kinematics]
-type = "conventional"
-stabilization = "silling"
-[material]
-type = "linear_elastic"
-density = 1.0
-youngs_modulus = 100.0
-poisson_ratio = 0.3
-[initial]
-displacement = ["0.02*x", "0"]
-velocity = ["-0.2*y", "0.2*x"]
-[integrator]
-type = "verlet"
-end_time = 1.0
-[output]
-frames = 4
-)";
+  const std::string spinning = SceneText{.lower = {-4, -2}, .upper = {4, 2}, .kinematics = "type = \"conventional\"\nstabilization = \"silling\"",
+                                         .material = "type = \"linear_elastic\"\ndensity = 1.0\nyoungs_modulus = 100.0\npoisson_ratio = 0.3",
+                                         .further = "[initial]\ndisplacement = [\"0.02*x\", \"0\"]\nvelocity = [\"-0.2*y\", \"0.2*x\"]\n[output]\nframes = 4",
+                                         .integrator = "type = \"verlet\"\nend_time = 1.0"};
   const auto told = [](const std::string& scene, const std::string& options) {
     const Desk desk(scene);
     const Result run = desk.perikit("run scene.toml -o out " + options);

@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include "robustness/same_results.hpp"
+#include "tests/kit/scene_text.hpp"
 
 using namespace perikit::test;
 
@@ -62,82 +63,24 @@ TEST_CASE("resume: a signal keeps the state, and the run goes on from it") {
 }
 
 TEST_CASE("resume: laws remember what happened at parts of families that are too poor for a gradient, and come back when no other is left") {
-  const std::string scene = R"toml(format = 1
-[body]
-dimension = 2
-plane = "strain"
-[body.lattice]
-spacing = 0.25
-lower = [0.875, -3.0]
-upper = [2.625, 0.0]
-[initial]
-velocity = ["-0.09*sin(-0.498*x + 0.851*y + 3.37)", "0.073*sin(-0.151*x + 1.036*y + 4.24)"]
-[family]
-horizon_ratio = 1.515
-influence = "inverse"
-[kinematics]
-type = "sub_horizon"
-[material]
-type = "hypoelastic"
-density = 166.65
-shear_modulus = 11156.7
-bulk_modulus = 107848.2
-[[region]]
-set = "part"
-material = { type = "hypoelastic", density = 333.3, shear_modulus = 2231.3, bulk_modulus = 21569.6 }
-[sets]
-low = "x < 1.125"
-part = "x > 1.7825"
-[damage]
-type = "max_stress"
-strength = 47.36
-no_fail = ["low"]
-gradual = true
-[integrator]
-type = "verlet"
-end_time = 1.2
-estimate = "bond_based"
-[output]
-frames = 3
-history_every = 1
-fields = ["displacement", "velocity", "damage"]
-)toml";
+  const std::string scene = SceneText{
+      .spacing = 0.25, .lower = {0.875, -3.0}, .upper = {2.625, 0.0}, .sets = "low = \"x < 1.125\"\npart = \"x > 1.7825\"", .family = "horizon_ratio = 1.515\ninfluence = \"inverse\"",
+      .kinematics = "sub_horizon", .material = "type = \"hypoelastic\"\ndensity = 166.65\nshear_modulus = 11156.7\nbulk_modulus = 107848.2",
+      .further = "[initial]\nvelocity = [\"-0.09*sin(-0.498*x + 0.851*y + 3.37)\", \"0.073*sin(-0.151*x + 1.036*y + 4.24)\"]\n"
+                 "[[region]]\nset = \"part\"\nmaterial = { type = \"hypoelastic\", density = 333.3, shear_modulus = 2231.3, bulk_modulus = 21569.6 }\n"
+                 "[damage]\ntype = \"max_stress\"\nstrength = 47.36\nno_fail = [\"low\"]\ngradual = true\n"
+                 "[output]\nframes = 3\nhistory_every = 1\nfields = [\"displacement\", \"velocity\", \"damage\"]",
+      .integrator = "type = \"verlet\"\nend_time = 1.2\nestimate = \"bond_based\""};
   goes_on_alike(scene, 60);
 }
 
 TEST_CASE("resume: points whose bonds have all failed keep what their laws remember") {
-  const std::string scene = R"toml(format = 1
-[body]
-dimension = 2
-plane = "stress"
-[body.lattice]
-spacing = 0.25
-lower = [-3.0, 0.0]
-upper = [-1.0, 2.0]
-[initial]
-velocity = ["1.8*sin(-1.0849*x - 1.4273*y + 2.63)", "1.6*sin(1.3494*x - 1.3491*y + 3.42)"]
-[family]
-horizon_ratio = 2.015
-[kinematics]
-type = "conventional"
-stabilization = "silling"
-[material]
-type = "hypoelastic"
-density = 127.877
-youngs_modulus = 2335.36
-poisson_ratio = 0.3
-[damage]
-type = "critical_stretch"
-stretch = 0.06
-[integrator]
-type = "verlet"
-end_time = 0.8
-safety = 0.5
-[output]
-frames = 3
-history_every = 1
-fields = ["displacement", "damage", "deformation_gradient", "first_piola"]
-)toml";
+  const std::string scene = SceneText{
+      .space = "stress", .spacing = 0.25, .lower = {-3.0, 0.0}, .upper = {-1.0, 2.0}, .kinematics = "type = \"conventional\"\nstabilization = \"silling\"",
+      .material = "type = \"hypoelastic\"\ndensity = 127.877\nyoungs_modulus = 2335.36\npoisson_ratio = 0.3",
+      .further = "[initial]\nvelocity = [\"1.8*sin(-1.0849*x - 1.4273*y + 2.63)\", \"1.6*sin(1.3494*x - 1.3491*y + 3.42)\"]\n[damage]\ntype = \"critical_stretch\"\nstretch = 0.06\n"
+                 "[output]\nframes = 3\nhistory_every = 1\nfields = [\"displacement\", \"damage\", \"deformation_gradient\", \"first_piola\"]",
+      .integrator = "type = \"verlet\"\nend_time = 0.8\nsafety = 0.5"};
   for (const std::string jitter : {"0.0", "0.2"}) {
     CAPTURE(jitter);
     goes_on_alike(replaced(scene, "spacing = 0.25", "spacing = 0.25\njitter = " + jitter), 20);
@@ -145,48 +88,15 @@ fields = ["displacement", "damage", "deformation_gradient", "first_piola"]
 }
 
 TEST_CASE("resume: a pressure acts on the surface as it was before bonds failed in the last step") {
-  goes_on_alike(R"toml(format = 1
-[body]
-dimension = 3
-[body.lattice]
-spacing = 3.0
-lower = [-15.0, 0.0, 0.0]
-upper = [-3.0, 15.0, 12.0]
-[sets]
-low = "z < 3.003"
-high = "z > 8.997"
-[family]
-horizon = 6.045
-[kinematics]
-type = "baqp"
-[material]
-type = "linear_elastic"
-youngs_modulus = 2.07e9
-poisson_ratio = 0.3
-density = 9513.0
-[damage]
-type = "max_stress"
-strength = 9.5e7
-no_fail = ["high"]
-[initial]
-velocity = ["43*sin(0.064*x - 0.116*y + 0.239*z + 3.32)", "23*sin(0.174*x - 0.095*y - 0.181*z + 0.999)", "25*sin(-0.033*x + 0.074*y + 0.26*z + 5.19)"]
-[[boundary]]
-set = "low"
-displacement = [0.0, 0.0, 0.0]
-[[load]]
-set = "high"
-pressure = -95.0e6
-face = "+z"
-follower = true
-[integrator]
-type = "verlet"
-end_time = 0.022
-safety = 0.1
-[output]
-frames = 3
-history_every = 1
-)toml",
-                8);
+  const std::string scene = SceneText{
+      .dimension = 3, .spacing = 3, .lower = {-15, 0, 0}, .upper = {-3, 15, 12}, .sets = "low = \"z < 3.003\"\nhigh = \"z > 8.997\"", .family = "horizon = 6.045",
+      .material = "type = \"linear_elastic\"\nyoungs_modulus = 2.07e9\npoisson_ratio = 0.3\ndensity = 9513.0",
+      .further = "[damage]\ntype = \"max_stress\"\nstrength = 9.5e7\nno_fail = [\"high\"]\n"
+                 "[initial]\nvelocity = [\"43*sin(0.064*x - 0.116*y + 0.239*z + 3.32)\", \"23*sin(0.174*x - 0.095*y - 0.181*z + 0.999)\", \"25*sin(-0.033*x + 0.074*y + 0.26*z + 5.19)\"]\n"
+                 "[[boundary]]\nset = \"low\"\ndisplacement = [0.0, 0.0, 0.0]\n[[load]]\nset = \"high\"\npressure = -95.0e6\nface = \"+z\"\nfollower = true\n"
+                 "[output]\nframes = 3\nhistory_every = 1",
+      .integrator = "type = \"verlet\"\nend_time = 0.022\nsafety = 0.1"};
+  goes_on_alike(scene, 8);
 }
 
 TEST_CASE("resume: another scene is refused with what differs") {
