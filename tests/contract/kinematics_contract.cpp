@@ -29,9 +29,9 @@ class Exceptions {
     return true;
   }
   void check() const {
-    for (const auto& [part, worst] : worst_) {
-      MESSAGE(part << " is not objective: relative error up to " << worst);
-      CHECK(worst > 1e-8);
+    for (const auto& part : worst_) {
+      MESSAGE(part.first << " is not objective: relative error up to " << part.second);
+      CHECK(part.second > 1e-8);
     }
   }
 

@@ -157,7 +157,8 @@ void check_extreme_stretches(const Law& law, const std::vector<double>& constant
     for (const double b : stretches)
       for (const double shear : {0.0, 0.4}) planes.push_back({a - 1, shear * a, -0.3 * shear * b, b - 1, 0});
   }
-  for (const auto& [space, points] : {std::pair(Space::plane_stress, planes), std::pair(Space::line_stress, lines)}) {
+  for (const Space space : {Space::plane_stress, Space::line_stress}) {
+    const std::vector<contract::Values>& points = space == Space::plane_stress ? planes : lines;
     contract::Random random(3);
     std::vector<contract::Values> directions;
     for (std::size_t p = 0; p < points.size(); ++p) directions.push_back(contract::random_direction(random, space));

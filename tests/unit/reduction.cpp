@@ -111,8 +111,7 @@ TEST_CASE("a column from others: in any order, of t and constants; not a number 
 
 TEST_CASE("at and exact go with their reductions, and these with them") {
   const auto refused = [](const std::string& record) { return message_of([&] { plate("x < 1", record); }); };
-  const auto contains = [](const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; };
-  for (const auto& [record, part] : std::vector<std::pair<std::string, std::string>>{
+  for (const auto& wrong : std::vector<std::pair<std::string, std::string>>{
            {"reduce = \"fit\"", "output.history.0.reduce: found \"fit\" without at; allowed: "},
            {"reduce = \"error\"", "output.history.0.reduce: found \"error\" without exact; allowed: "},
            {"at = [1, 2]", "output.history.0.at: found it with reduce = \"mean\"; allowed: only with reduce = \"fit\""},
@@ -136,7 +135,7 @@ TEST_CASE("at and exact go with their reductions, and these with them") {
            {"reduce = \"sum\" }, { name = \"a\", value = \"u\", set = \"some\"", "output.history.1.set: found an unknown key; allowed: name, value"},
            {"reduce = \"sum\" }, { name = \"residual\", value = \"u\"", "output.history.1.name: found \"residual\" again"},
            {"reduce = \"error\", exact = \"x + q\"", "output.history.0.exact: "}}) {
-    const std::string message = refused(record);
-    CHECK_MESSAGE(contains(message, part), message);
+    const std::string message = refused(wrong.first);
+    CHECK_MESSAGE(contains(message, wrong.second), message);
   }
 }

@@ -62,7 +62,10 @@ TEST_CASE("row packs: rows by component, and back") {
     for (int k = 0; k < stride * pack_width; ++k) {
       const auto lane = std::find(at.begin(), at.begin() + n, k / stride);
       const double factor = k % stride == 1 && lane != at.begin() + n ? 2 : 1;
-      for (int c = 0; c < 4; ++c) CHECK(sums[static_cast<std::size_t>(k)][c] == factor * (10 * k + c));
+      for (int c = 0; c < 4; ++c) {
+        const double sum = sums[static_cast<std::size_t>(k)][c];
+        CHECK(sum == factor * (10 * k + c));
+      }
     }
   }
 }
