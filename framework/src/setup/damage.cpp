@@ -46,13 +46,13 @@ double rayleigh_speed(const Moduli& moduli, double density) {
 
 void refuse_unsuited(const Scene& scene, const Formulation& formulation, const DamageTraits& traits) {
   const auto refuse = [&](const std::string& found, const std::string& allowed) {
-    throw InputError(scene.damage->values.position(""), "damage", fmt::format("found with {}; allowed: {}", found, allowed));
+    throw InputError(scene.damage->values.position(""), "damage", fmt::format("found {}; allowed: {}", found, allowed));
   };
   const std::string criterion = fmt::format("\"{}\"", scene.damage->type);
   if (traits.stress && formulation.pairs)
     refuse(fmt::format("{} with kinematics \"{}\", whose bonds have no stress", criterion, scene.kinematics->type),
            "kinematics with gradients, or criteria by stretch or energy");
-  if (formulation.force_state == ForceState::local) refuse("kinematics.force_state = \"local\"", "\"variational\"");
+  if (formulation.force_state == ForceState::local) refuse("with kinematics.force_state = \"local\"", "\"variational\"");
 }
 
 }  // namespace
