@@ -126,7 +126,7 @@ def changed_scene(scene, change, tables):
             for item in content if isinstance(content, list) else [content]:
                 change_section(item, name, tables, change)
         if name in tables.parts:
-            out[name] = changed_part(content, name, tables, change)
+            out[name] = [changed_part(item, name, tables, change) for item in content] if isinstance(content, list) else changed_part(content, name, tables, change)
     out["sets"] = {name: changed_set(value, change) for name, value in scene.get("sets", {}).items()}
     out.get("output", {}).pop("history", None)
     if "files" in out:
@@ -150,6 +150,8 @@ def changed_part(part, kind, tables, change):
             value = changed_part(value, name, tables, change)
         elif name == "base" and isinstance(value, dict):
             value = changed_part(value, "kinematics", tables, change)
+        elif name in keys and isinstance(value, list) and "one for each dimension" in keys[name].allowed:
+            value = change.vector(value, change.factor(keys[name].unit))
         elif name in keys and takes_numbers(keys[name]):
             value = change.value(value, change.factor(keys[name].unit))
         out[name] = value

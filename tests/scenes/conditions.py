@@ -1,5 +1,7 @@
 """Random boundaries, loads, planes of symmetry, periodic sides and initial values."""
 
+import random
+
 from bodies import Bodies
 from draws import AXES, rounded
 
@@ -99,6 +101,18 @@ class Conditions(Bodies):
             scene["boundary"] = boundaries
         if loads:
             scene["load"] = loads
+
+    def terms(self):
+        """A foundation of about the stiffness of the body, which may grow. Drawn apart, so that all else of a seed is what it was."""
+        r = random.Random("terms of %s" % self.seed)
+        if r.random() > 0.12 and not self.wishes_key("term.set"):
+            return []
+        stiffness = rounded(self.E / self.size ** 2 * 10 ** r.uniform(-1, 1))
+        end = self.end_time if self.integrator_name == "verlet" else 1.0
+        term = {"type": "foundation", "set": r.choice(["all", "low", "part"]), "stiffness": r.choice([stiffness, "%.6g*(1 + t/%.6g)" % (stiffness, end)])}
+        if r.random() < 0.5:
+            term["normal"] = [rounded(r.uniform(0.1, 1) * r.choice([-1, 1])) for _ in range(self.dimension)]
+        return [term]
 
     def mirrors(self, wished):
         """Axes of planes of symmetry, which may meet. In statics either all axes or none that the ends lie on: the rest stays held there."""

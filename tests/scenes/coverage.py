@@ -44,6 +44,7 @@ def features(scene):
         out.add("%s, %s" % (kinematics, scene["family"].get("interfaces", "laminate")))
     if "points" in scene["body"]:
         out.add("points " + scene["body"]["points"]["file"].split(".")[-1])
+    out |= {"term " + term["type"] for term in scene.get("term", [])}
     if "damage" in scene:
         out |= {"damage " + part_name(scene["damage"]), "%s, %s" % (kinematics, part_name(scene["damage"]))}
     for condition in ("boundary", "symmetry", "periodic", "load"):
@@ -62,6 +63,6 @@ def wanted(tables):
     out |= {"points " + kind for kind in FILES} | {"key constants"}
     # Parts stand under sections of their kind.
     out |= {"key %s.%s" % (name, key) for name, table in tables.sections.items() if name not in ("", "sets", "constants") for key in table.keys}
-    out |= {"key %s.%s" % (kind, key) for kind in ("kinematics", "material", "damage", "integrator") for table in tables.parts[kind].values()
+    out |= {"key %s.%s" % (kind, key) for kind in ("kinematics", "material", "damage", "term", "integrator") for table in tables.parts[kind].values()
             for key in table.keys}
     return out

@@ -94,7 +94,7 @@ class Generator(Conditions):
         explicit = self.explicit_only or self.maybe(0.6)
         self.integrator_name = self.wish("integrator", lambda: "verlet" if explicit else r.choice(list(self.tables.parts["integrator"])))
         scene["kinematics"] = self.kinematics()
-        laws = [law for law in self.tables.parts["material"] if law != "hypoelastic" or not self.statics]
+        laws = list(self.tables.parts["material"])
         scene["material"] = self.law(laws)
         failing = self.integrator_name != "evaluate" and self.maybe(0.45)
         failing = self.wishes.get("damage", "none" if not failing else "") != "none"
@@ -107,6 +107,8 @@ class Generator(Conditions):
         if self.dimension > 1 and self.maybe(0.15, "crack.%s" % ("segment" if self.dimension == 2 else "polygon")):
             scene["crack"] = [self.crack() for _ in range(r.choice([1, 1, 1, 2]))]
         self.conditions(scene)
+        if terms := self.terms():
+            scene["term"] = terms
         scene["integrator"] = as_table(self.part("integrator", self.integrator_name))
         scene["output"] = self.output(scene)
         if columns := [*self.columns(), *self.columns_of_cracks()]:

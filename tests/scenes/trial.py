@@ -156,7 +156,7 @@ class Trial:
     def look_at_momentum(self, out):
         """Where nothing is held: linear momentum, and angular momentum of parts that keep it."""
         scene = self.scene
-        if any(section in scene for section in ("boundary", "load", "symmetry", "periodic")) or not self.conservative():
+        if any(section in scene for section in ("boundary", "load", "term", "symmetry", "periodic")) or not self.conservative():
             return
         body = reference(out)
         X, V, law = body["position"], body["volume"], body["material_id"].astype(int)
