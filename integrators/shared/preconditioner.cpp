@@ -108,6 +108,7 @@ class CompanionCycle final : public Preconditioner {
   void apply(ConstFieldView r, FieldView z) override { cycle_->apply(r, z); }
 
  private:
+  bool follows_state() const noexcept override { return false; }
   bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) override {
     Problem& problem = equilibrium.problem();
     const std::int64_t step = problem.state().step;
@@ -160,14 +161,17 @@ Preconditioner::Preconditioner(Problem& problem)
       numbers_(problem.state().declare_numbers("preconditioner", 4)) {}
 
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
-  const bool worn = !equilibrium.problem().constant_stiffness() && lately() > patience() * at_first() + 2;
-  if (made() == 0 || worn || (wary() != 0 && far_from(equilibrium))) return renew(equilibrium, u, failure);
+  Problem& problem = equilibrium.problem();
+  const bool worn = !problem.constant_stiffness() && lately() > patience() * at_first() + 2;
+  const bool older = problem.laws().state_components() > 0 && follows_state() && step_ != problem.state().step;
+  if (made() == 0 || worn || older || (wary() != 0 && far_from(equilibrium))) return renew(equilibrium, u, failure);
   if (alike_within() >= 0 && alike_within() != equilibrium.problem().state().step) in_hand_ = false;
   return in_hand_ || (in_hand_ = make(equilibrium, state_, Occasion::kept, failure));
 }
 
 bool Preconditioner::renew(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   copy(u, state_);
+  step_ = equilibrium.problem().state().step;
   const Occasion occasion = made() == 0 ? Occasion::bonds : Occasion::worn;
   in_hand_ = make(equilibrium, state_, occasion, failure);
   at_first() = lately() = 0;

@@ -50,6 +50,8 @@ class Preconditioner {
   /// Not -1: something in it comes from one made before, in this load step. A run that goes on from the end of the step cannot
   /// make it so, and therefore none has it in the next one.
   virtual std::int64_t alike_within() const noexcept { return -1; }
+  /// Whether it depends on what laws remember, which is another thing in each load step: then none is kept for the next one.
+  virtual bool follows_state() const noexcept { return true; }
   /// Iterations a digit of the first solve with it; 0: none yet.
   double first_effort() const noexcept { return numbers_[1]; }
 
@@ -63,6 +65,7 @@ class Preconditioner {
   FieldView state_;  ///< where it was made
   std::span<double> numbers_;
   bool in_hand_ = false;
+  std::int64_t step_ = -1;   ///< in which it was made
 };
 
 /// The key `preconditioner` of an integrator. mixed: it has mixed systems (MixedSystem).

@@ -184,3 +184,19 @@ TEST_CASE("integrator: quasi-static paths of a law that remembers, in closed for
       CHECK(std::abs(problem.state().displacement().component(0)[p] - stretch * problem.body().position(static_cast<std::size_t>(p))[0]) < 1e-7);
   }
 }
+
+TEST_CASE("integrator: quasi-static paths of a law that remembers go on to the bit after a stop") {
+  BodyOptions body = plate(false);
+  body.material = "type = \"hypoelastic\"\nyoungs_modulus = 2.0\npoisson_ratio = 0.3";
+  body.conditions += "[[boundary]]\nset = \"right\"\ndisplacement = [0.3, 0.1]\n";
+  for (const Example& integrator : quasi_static_integrators(6)) {
+    INFO(integrator.part, ": ", integrator.table);
+    const auto whole = build_run(body, integrator), first = build_run(body, integrator), second = build_run(body, integrator);
+    const std::int64_t steps = run(*whole).reports.back().step;
+    run(*first, steps / 2);
+    second->problem().restore(first->problem().snapshot());
+    run(*second);
+    CHECK(displacement(*second) == displacement(*whole));
+    CHECK(second->problem().state().energies.strain == whole->problem().state().energies.strain);
+  }
+}
