@@ -194,7 +194,7 @@ bool KinsolSolver::predict(Equilibrium& equilibrium, bool extrapolated, std::str
       return false;
     }
     if (preconditioner_ ? !preconditioner_->prepare(equilibrium, u, failure)
-                        : !matrix_->tangent().make(equilibrium, u, true, failure))
+                        : !matrix_->tangent().make(equilibrium, equilibrium.at(u), true, failure))
       return false;
     action = [this](ConstFieldView from, FieldView to) {
       if (preconditioner_)
@@ -284,7 +284,7 @@ bool KinsolSolver::unstable(Equilibrium& equilibrium, ConstFieldView u, bool las
   if (!last) return false;
   if (preconditioner_) return preconditioner_->finds_unstable(equilibrium, u);
   std::string failure;
-  if (matrix_) return matrix_->tangent().make(equilibrium, u, false, failure) && matrix_->tangent().indefinite();
+  if (matrix_) return matrix_->tangent().make(equilibrium, equilibrium.at(u), false, failure) && matrix_->tangent().indefinite();
   return has_negative_curvature(equilibrium, u);
 }
 

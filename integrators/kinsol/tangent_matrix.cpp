@@ -24,7 +24,7 @@ TangentMatrix::~TangentMatrix() {
 }
 
 bool TangentMatrix::assemble(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
-  if (!tangent_.assemble(equilibrium, u, true, failure)) return false;
+  if (!tangent_.assemble(equilibrium, equilibrium.at(u), true, failure)) return false;
   free_.values(tangent_.matrix(), false, first_, value_);
   sunindextype* pointers = SUNSparseMatrix_IndexPointers(matrix_);
   sunindextype* rows = SUNSparseMatrix_IndexValues(matrix_);

@@ -19,7 +19,7 @@ bool FactorisedEquations::linearise(Equilibrium& equilibrium, ConstFieldView u, 
   if (equilibrium.problem().constant_stiffness() && factors.factorised()) return true;
   const bool first = factors.unknowns() == 0;
   in_step_ = true;
-  if (!tangent_.make(equilibrium, u, true, failure)) return false;
+  if (!tangent_.make(equilibrium, equilibrium.at(u), true, failure)) return false;
   if (first) {
     equilibrium.note(fmt::format("  tangent: {} unknowns, {:.3g} numbers, {:.3g} in its factors", factors.unknowns(),
                                  static_cast<double>(tangent_.matrix().values.size()), factors.factor_entries()));
@@ -55,7 +55,7 @@ bool FactorisedEquations::unstable(Equilibrium& equilibrium, ConstFieldView u, b
   const bool made = std::exchange(in_step_, false);
   std::string failure;
   if (made ? !tangent_.indefinite() : !last) return false;
-  return tangent_.make(equilibrium, u, false, failure) && tangent_.indefinite();
+  return tangent_.make(equilibrium, equilibrium.at(u), false, failure) && tangent_.indefinite();
 }
 
 bool Newton::direct(Problem& problem) const {

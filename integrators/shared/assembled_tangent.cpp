@@ -5,30 +5,30 @@
 
 namespace perikit {
 
-bool AssembledTangent::assemble_as(Equilibrium& equilibrium, ConstFieldView u, bool convex, std::string& failure) {
+bool AssembledTangent::assemble_as(Equilibrium& equilibrium, const Configuration& at, bool convex, std::string& failure) {
   solver_.watch([&equilibrium] { return equilibrium.goes_on(); });
   matrix_.convex = convex;
   factorised_ = false;
-  const EvaluationStatus status = equilibrium.problem().assemble_tangent(equilibrium.at(u), matrix_);
+  const EvaluationStatus status = equilibrium.problem().assemble_tangent(at, matrix_);
   if (!status.ok()) failure = status.description.empty() ? "the tangent met an inadmissible deformation" : status.description;
   return status.ok();
 }
 
-bool AssembledTangent::assemble(Equilibrium& equilibrium, ConstFieldView u, bool may_convex, std::string& failure) {
+bool AssembledTangent::assemble(Equilibrium& equilibrium, const Configuration& at, bool may_convex, std::string& failure) {
   if (equilibrium.parameter() != load_) indefinite_ = false;
   load_ = equilibrium.parameter();
   const bool choose = may_convex && far_from(equilibrium);
-  if (choose && indefinite_) return assemble_as(equilibrium, u, true, failure);
-  if (!assemble_as(equilibrium, u, false, failure)) return false;
+  if (choose && indefinite_) return assemble_as(equilibrium, at, true, failure);
+  if (!assemble_as(equilibrium, at, false, failure)) return false;
   if (!choose || !matrix_.symmetric) return true;
   factorised_ = solver_.factorise_definite(matrix_, equilibrium.free(), failure);
   if (factorised_ || !failure.empty()) return factorised_;
   indefinite_ = true;
-  return assemble_as(equilibrium, u, true, failure);
+  return assemble_as(equilibrium, at, true, failure);
 }
 
-bool AssembledTangent::make(Equilibrium& equilibrium, ConstFieldView u, bool may_convex, std::string& failure) {
-  if (!assemble(equilibrium, u, may_convex, failure)) return false;
+bool AssembledTangent::make(Equilibrium& equilibrium, const Configuration& at, bool may_convex, std::string& failure) {
+  if (!assemble(equilibrium, at, may_convex, failure)) return false;
   return factorised_ || (factorised_ = solver_.factorise(matrix_, equilibrium.free(), failure));
 }
 

@@ -24,11 +24,11 @@ inline constexpr double nearly_singular = 1e-14;
 /// tangents between indefinite ones are nearly singular, and their steps too long.
 class AssembledTangent {
  public:
-  /// Assembles it at u, the state of the last residual. False where that is inadmissible or memory is short; `failure` says why.
+  /// Assembles it, as a rule at the state of the last residual. False where that is inadmissible or memory is short; `failure` says why.
   /// may_convex: false where it shall be exact everywhere.
-  bool assemble(Equilibrium& equilibrium, ConstFieldView u, bool may_convex, std::string& failure);
+  bool assemble(Equilibrium& equilibrium, const Configuration& at, bool may_convex, std::string& failure);
   /// The same, and factorises it.
-  bool make(Equilibrium& equilibrium, ConstFieldView u, bool may_convex, std::string& failure);
+  bool make(Equilibrium& equilibrium, const Configuration& at, bool may_convex, std::string& failure);
   /// x <- K^-1 b on free components, 0 elsewhere, after make(). b and x may be the same field.
   void solve(ConstFieldView b, FieldView x) { solver_.solve(b, x); }
   /// Kw <- K w on free components, 0 elsewhere.
@@ -42,7 +42,7 @@ class AssembledTangent {
   bool convex() const noexcept { return matrix_.convex; }
 
  private:
-  bool assemble_as(Equilibrium& equilibrium, ConstFieldView u, bool convex, std::string& failure);
+  bool assemble_as(Equilibrium& equilibrium, const Configuration& at, bool convex, std::string& failure);
 
   BlockMatrix matrix_;
   SparseSolver solver_;

@@ -23,8 +23,8 @@ class Factorisation final : public Preconditioner {
   const AssembledTangent* tangent() const noexcept override { return &tangent_; }
 
  private:
-  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) override {
-    return tangent_.make(equilibrium, u, occasion != Occasion::kept, failure);
+  bool make(Equilibrium& equilibrium, const Configuration& at, Occasion occasion, std::string& failure) override {
+    return tangent_.make(equilibrium, at, occasion != Occasion::kept, failure);
   }
   AssembledTangent tangent_;
 };
@@ -47,8 +47,8 @@ class BlockJacobi final : public Preconditioner {
   }
 
  private:
-  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion, std::string& failure) override {
-    if (!tangent_.assemble(equilibrium, u, false, failure)) return false;
+  bool make(Equilibrium& equilibrium, const Configuration& at, Occasion, std::string& failure) override {
+    if (!tangent_.assemble(equilibrium, at, false, failure)) return false;
     const BlockMatrix& K = tangent_.matrix();
     const ConstFieldView free = equilibrium.free();
     d_ = K.dimension;
@@ -109,12 +109,13 @@ class CompanionCycle final : public Preconditioner {
 
  private:
   bool follows_state() const noexcept override { return false; }
-  bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) override {
+  bool make(Equilibrium& equilibrium, const Configuration& at, Occasion occasion, std::string& failure) override {
     Problem& problem = equilibrium.problem();
     const std::int64_t step = problem.state().step;
     cycle_->watch([&equilibrium] { return equilibrium.goes_on(); });
     if (!alike_) own_effort_ = first_effort();
     const bool alike = occasion == Occasion::bonds && step == step_ && first_effort() <= 1.05 * own_effort_;
+    const ConstFieldView u = at.u();
     problem.assemble_companion(u, springs_, most_bulk_);
     if (equilibrium.goes_on()) alike_ = cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.body(), u), alike);
     step_ = occasion == Occasion::kept ? -1 : step;
@@ -158,7 +159,7 @@ bool factorisation_pays(Problem& problem) {
 
 Preconditioner::Preconditioner(Problem& problem)
     : state_(problem.state().declare("preconditioner_state")),
-      numbers_(problem.state().declare_numbers("preconditioner", 4)) {}
+      numbers_(problem.state().declare_numbers("preconditioner", 5)) {}
 
 bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   Problem& problem = equilibrium.problem();
@@ -166,14 +167,15 @@ bool Preconditioner::prepare(Equilibrium& equilibrium, ConstFieldView u, std::st
   const bool older = problem.laws().state_components() > 0 && follows_state() && step_ != problem.state().step;
   if (made() == 0 || worn || older || (wary() != 0 && far_from(equilibrium))) return renew(equilibrium, u, failure);
   if (alike_within() >= 0 && alike_within() != equilibrium.problem().state().step) in_hand_ = false;
-  return in_hand_ || (in_hand_ = make(equilibrium, state_, Occasion::kept, failure));
+  return in_hand_ || (in_hand_ = make(equilibrium, Configuration(state_, made_at()), Occasion::kept, failure));
 }
 
 bool Preconditioner::renew(Equilibrium& equilibrium, ConstFieldView u, std::string& failure) {
   copy(u, state_);
   step_ = equilibrium.problem().state().step;
+  made_at() = equilibrium.parameter();
   const Occasion occasion = made() == 0 ? Occasion::bonds : Occasion::worn;
-  in_hand_ = make(equilibrium, state_, occasion, failure);
+  in_hand_ = make(equilibrium, equilibrium.at(state_), occasion, failure);
   at_first() = lately() = 0;
   // A convex tangent serves at its own state only.
   made() = in_hand_ && !convex() ? 1 : 0;

@@ -42,11 +42,11 @@ class Preconditioner {
   explicit Preconditioner(Problem& problem);
   /// How many times as many iterations a digit as at first it may take before it is made anew.
   virtual double patience() const noexcept { return 2; }
-  /// Why it is made: it is worn out; bonds have changed, or there is none; or it is to be what it was where it was made, u, which
+  /// Why it is made: it is worn out; bonds have changed, or there is none; or it is to be what it was where and when it was made, which
   /// is not the present state: after an interruption, and where something in it was older.
   enum class Occasion { worn, bonds, kept };
-  /// Makes it at u.
-  virtual bool make(Equilibrium& equilibrium, ConstFieldView u, Occasion occasion, std::string& failure) = 0;
+  /// Makes it there.
+  virtual bool make(Equilibrium& equilibrium, const Configuration& at, Occasion occasion, std::string& failure) = 0;
   /// Not -1: something in it comes from one made before, in this load step. A run that goes on from the end of the step cannot
   /// make it so, and therefore none has it in the next one.
   virtual std::int64_t alike_within() const noexcept { return -1; }
@@ -62,6 +62,7 @@ class Preconditioner {
   double& wary() noexcept {
     return numbers_[3];
   }                  ///< not 0: the last tangent that it was made of far from equilibrium was indefinite
+  double& made_at() noexcept { return numbers_[4]; }   ///< load parameter at which it was made
   FieldView state_;  ///< where it was made
   std::span<double> numbers_;
   bool in_hand_ = false;
