@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
+
+#include "setup/numeric_values.hpp"
 
 namespace perikit {
 
@@ -29,44 +30,15 @@ class SilentMaterial final : public Material {
   }
 };
 
-/// The numbers and expressions of a part by key.
-using Values = std::map<std::string, Expression, std::less<>>;
-
-Values numeric_values(const PartValues& part, const Constants& constants) {
-  Values values;
-  for (const std::string& key : part.values.keys()) {
-    const ParameterValue* value = part.values.find(key);
-    if (const auto* number = std::get_if<double>(value))
-      values.emplace(key, Expression(*number));
-    else if (const auto* text = std::get_if<std::string>(value); text && part.values.is_expression(key))
-      values.emplace(key, Expression(*text, constants, false, part.values.position(key), part.values.path() + "." + key));
-  }
-  return values;
-}
-
 /// out <- the constants of the law at x. Throws InputError.
-void constants_at(const Point& x, const PartValues& part, const Values& values, const MaterialRecord& record, double* out) {
+void constants_at(const Point& x, const PartValues& part, const NumericValues& values, const MaterialRecord& record, double* out) {
   const MaterialInput input{[&](std::string_view key) { return values.contains(key); },
                             [&](std::string_view key) { return values.find(key)->second(x); }};
-  try {
-    record.material->constants(input, out);
-  } catch (const std::domain_error& error) {
-    // The law speaks of the parameter as it knows it: "found NAME = ...".
-    const std::string text = record.uniform ? std::string(error.what())
-                                            : fmt::format("{}, at ({:.6g}, {:.6g}, {:.6g})", error.what(), x[0], x[1], x[2]);
-    for (const auto& [key, value] : values)
-      if (text.starts_with(fmt::format("found {} = ", key))) throw part.values.error(key, text);
-    throw InputError(part.values.position(""), part.values.path(), text);
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw InputError(part.values.position(""), part.values.path(), fmt::format("material '{}' failed: {}", part.type, error.what()));
-  } catch (...) {
-    throw InputError(part.values.position(""), part.values.path(), fmt::format("material '{}' failed: it threw something that is no std::exception", part.type));
-  }
+  const auto where = [&] { return record.uniform ? std::string() : fmt::format(", at ({:.6g}, {:.6g}, {:.6g})", x[0], x[1], x[2]); };
+  make_constants(part, "material", values, where, [&] { record.material->constants(input, out); });
 }
 
-void fill_varying(MaterialRecord& record, const PartValues& part, const Values& values, const Body& body, std::size_t id) {
+void fill_varying(MaterialRecord& record, const PartValues& part, const NumericValues& values, const Body& body, std::size_t id) {
   const auto count = static_cast<std::size_t>(record.traits.constants);
   const std::size_t stride = body.stride();
   const auto ids = body.material_ids();
@@ -95,7 +67,7 @@ MaterialRecord build_record(const PartValues& part, const Scene& scene, const Pa
   MaterialRecord record;
   record.material = factory.material(part);
   record.traits = record.material->traits();
-  const Values values = numeric_values(part, scene.constants);
+  const NumericValues values = numeric_values(part, scene.constants, false);
   record.uniform = std::ranges::none_of(values, [](const auto& entry) { return entry.second.depends_on_position(); });
   if (!record.uniform) {
     fill_varying(record, part, values, body, id);

@@ -3,52 +3,24 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 
 #include "families/families.hpp"
+#include "setup/numeric_values.hpp"
 
 namespace perikit {
 
 namespace {
 
-using Values = std::map<std::string, Expression, std::less<>>;
-
-Values values_of(const PartValues& part, const Constants& constants) {
-  Values values;
-  for (const std::string& key : part.values.keys()) {
-    const ParameterValue* value = part.values.find(key);
-    if (const auto* number = std::get_if<double>(value)) values.emplace(key, Expression(*number));
-    else if (const auto* text = std::get_if<std::string>(value); text && part.values.is_expression(key))
-      values.emplace(key, Expression(*text, constants, true, part.values.position(key), part.values.path() + "." + key));
-  }
-  return values;
-}
-
-/// out <- the constants at x and time. What the part says of a parameter, it says as it knows it: "found NAME = ...".
-void find_constants(const PointTerm& term, const PartValues& part, const Values& values, const Point& x, double time, double* out) {
+/// out <- the constants at x and time.
+void find_constants(const PointTerm& term, const PartValues& part, const NumericValues& values, const Point& x, double time, double* out) {
   const MaterialInput input{[&](std::string_view key) { return values.contains(key); },
                             [&](std::string_view key) {
                               const auto value = values.find(key);
                               if (value == values.end()) throw std::logic_error(fmt::format("asked for the parameter '{}', which it does not have as a number", key));
                               return value->second(x, time);
                             }};
-  const auto failed = [&](const std::string& what) {
-    return InputError(part.values.position(""), part.values.path(), fmt::format("term '{}' failed: {}", part.type, what));
-  };
-  try {
-    term.constants(input, out);
-  } catch (const std::domain_error& error) {
-    const std::string text = fmt::format("{}, at ({:.6g}, {:.6g}, {:.6g}), t = {:.6g}", error.what(), x[0], x[1], x[2], time);
-    for (const auto& [key, value] : values)
-      if (text.starts_with(fmt::format("found {} = ", key))) throw part.values.error(key, text);
-    throw InputError(part.values.position(""), part.values.path(), text);
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw failed(error.what());
-  } catch (...) {
-    throw failed("it threw something that is no std::exception");
-  }
+  const auto where = [&] { return fmt::format(", at ({:.6g}, {:.6g}, {:.6g}), t = {:.6g}", x[0], x[1], x[2], time); };
+  make_constants(part, "term", values, where, [&] { term.constants(input, out); });
 }
 
 void refuse(const Scene& scene, const PartValues& part, const TermTraits& traits, const IntegratorTraits& integrator) {
@@ -71,7 +43,7 @@ std::vector<PointTermPart> point_term_parts(const Scene& scene, const PartFactor
     const std::shared_ptr<const PartValues> part = description.part;
     const std::shared_ptr<const PointTerm> term = factory.term(*part);
     refuse(scene, *part, term->traits(), integrator);
-    auto values = std::make_shared<const Values>(values_of(*part, scene.constants));
+    auto values = std::make_shared<const NumericValues>(numeric_values(*part, scene.constants, true));
     const auto some = [&](auto&& depends) { return std::ranges::any_of(*values, [&](const auto& value) { return depends(value.second); }); };
     parts.push_back({.term = term,
                      .name = part->type,
