@@ -108,7 +108,10 @@ TEST_CASE("questionable: moduli that rounding decides, or that overflow") {
 }
 
 TEST_CASE("questionable: a field that is not finite is told of") {
-  const Desk desk(replaced(replaced(plate, "frames = 5", "frames = 5\nfields = [\"displacement\", \"shape_tensor_condition\"]"),
+  std::string columns;
+  for (const std::string reduce : {"min", "max", "mean", "sum"})
+    columns += fmt::format("{{ name = \"{}_of_condition\", set = \"all\", quantity = \"shape_tensor_condition\", reduce = \"{}\" }}, ", reduce, reduce);
+  const Desk desk(replaced(replaced(replaced(plate, "frames = 5", "frames = 5\nfields = [\"displacement\", \"shape_tensor_condition\"]"), "history = [", "history = [\n  " + columns),
                            "upper = [8, 5]\n", "upper = [12, 5]\ninside = \"x < 8 || (x > 11 && y < 1)\"\n"));
   const Result run = desk.perikit("run scene.toml -o out");
   CHECK_MESSAGE(run.status == 0, run.err);
@@ -116,6 +119,10 @@ TEST_CASE("questionable: a field that is not finite is told of") {
       contains(run.out,
                "warning: frame 0: shape_tensor_condition is not finite at point 8 (in input order), whose family is too poor"),
       run.out);
+  for (const std::string reduce : {"max", "mean", "sum"})
+    CHECK_MESSAGE(contains(run.out, "warning: history column " + reduce + "_of_condition is inf at t = 0: a point of its set has a family too poor"), run.out);
+  CHECK(!contains(run.out, "column min_of_condition"));
+  CHECK(contains(desk.text("out/history.csv"), ",inf,inf,inf,"));
 }
 
 TEST_CASE("questionable: faces of a crack that pass through each other are told of, once") {

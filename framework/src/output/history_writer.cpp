@@ -92,7 +92,7 @@ void HistoryWriter::row(std::span<const double> values) {
         fmt::format("{}: found {} values; there are {} columns", self.file.string(), values.size(), self.columns.size()));
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (std::isfinite(values[i]) || (std::isnan(values[i]) && self.may_be_missing[i])) continue;
+    if (std::isfinite(values[i]) || self.may_be_missing[i]) continue;
     throw RunError(fmt::format("{}: column '{}' is {} where {} = {}", self.file.string(), self.columns[i], values[i],
                                self.columns[0], values[0]));
   }

@@ -84,7 +84,7 @@ class FrameWriter {
 /// history.csv: a header line with names, then one row per sample; flushed row by row, 17 significant digits.
 class HistoryWriter {
  public:
-  /// `keep_rows` >= 0 continues an existing file after its first `keep_rows` rows. `missing`: the columns that may be NaN, which is written as nan.
+  /// `keep_rows` >= 0 continues an existing file after its first `keep_rows` rows. `missing`: the columns that may be NaN or infinite, written as nan and inf.
   HistoryWriter(const std::filesystem::path& file, std::vector<std::string> columns, std::int64_t keep_rows = -1,
                 const std::vector<std::string>& missing = {});
   ~HistoryWriter();

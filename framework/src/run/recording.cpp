@@ -407,8 +407,12 @@ void RunRecorder::write_history(const StepReport& report, bool counts) {
                           report.residual};
   if (problem.dissipates()) row.push_back(energies.dissipated_by_laws);
   const OutputDescription& output = simulation_.scene().output;
-  for (const HistoryDescription& record : output.history)
+  for (const HistoryDescription& record : output.history) {
     row.push_back(record.value ? 0 : reduced(record, problem, fields_, report.time));
+    if (record.quantity == "shape_tensor_condition" && !std::isfinite(row.back()) && undefined_.insert(record.name).second)
+      log(named("not_finite", fmt::format("warning: history column {} is {} at t = {:.6g}: a point of its set has a family too poor for a gradient", record.name,
+                      row.back(), report.time)));
+  }
   for (const std::size_t k : output.derived) row[columns_.size() - output.history.size() + k] = derived_value(output.history[k], row, report);
   if (counts) done_.history_fingerprint = with_row(done_.history_fingerprint, row);
   ++rows_written_;

@@ -213,7 +213,7 @@ class RunRecorder final : public Observer {
   double time_step_ = 0;   ///< of the last step that was reported
   std::vector<std::string> warnings_;
   bool faces_crossed_ = false;             ///< a warning said so
-  std::set<std::string> undefined_;        ///< columns from others that were NaN
+  std::set<std::string> undefined_;        ///< columns that were not finite
   std::set<std::string> strange_fields_;   ///< that were not finite somewhere
   bool shares_frames_ = false;             ///< ranks write frames together
 };

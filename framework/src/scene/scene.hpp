@@ -127,8 +127,8 @@ struct HistoryDescription {
   std::array<double, 3> direction{};         ///< with reduce "extent" and "tip", of length 1
   double above = 0;                          ///< likewise, in the unit of the quantity
   std::int64_t piece = 0;                    ///< with reduce "mass"
-  /// Whether a row may have no value, which is written as nan.
-  bool may_be_missing() const noexcept { return value || reduce == "tip"; }
+  /// Whether a row may have no value, which is written as nan, or an infinite one.
+  bool may_be_missing() const noexcept { return value || reduce == "tip" || quantity == "shape_tensor_condition"; }
 };
 
 struct OutputDescription {
