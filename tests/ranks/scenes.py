@@ -1,5 +1,6 @@
 """Scenes for runs on several ranks, and what compares their results."""
 
+import filecmp
 import os
 import shutil
 import subprocess
@@ -143,6 +144,8 @@ def differences(a, b):
     if frames != sorted(os.listdir(os.path.join(b, "frames"))):
         found.append("other frames")
     for name in ["reference.h5"] + ["frames/" + frame for frame in frames]:
+        if filecmp.cmp(os.path.join(a, name), os.path.join(b, name), shallow=False):
+            continue
         done = subprocess.run(["h5diff", os.path.join(a, name), os.path.join(b, name)], capture_output=True, text=True)
         if done.returncode != 0:
             found.append("%s: %s" % (name, " ".join(done.stdout.split()[:12]) or done.stderr.strip()))

@@ -139,8 +139,8 @@ TEST_CASE("partition: explicit runs on several ranks are those on one, bit for b
         INFO(kinematics, ", ", dimension, "D ", std::string(cloud ? "cloud" : "lattice"));
         contract::BodyOptions body = body_of(dimension, cloud);
         // Gradients of order 2 on jittered clouds in space are stiff: shorter steps.
-        body.integrator = dimension == 3 ? "type = \"verlet\"\nend_time = 0.2\ntime_step = 0.01"
-                                         : "type = \"verlet\"\nend_time = 1.5\ntime_step = 0.05";
+        body.integrator = dimension == 3 ? "type = \"verlet\"\nend_time = 0.06\ntime_step = 0.01"
+                                         : "type = \"verlet\"\nend_time = 0.5\ntime_step = 0.05";
         compare(contract::scene_text(body, kinematics), dimension == 3 ? std::vector{2} : std::vector{2, 3});
       }
 }
@@ -175,7 +175,7 @@ TEST_CASE("partition: bonds fail on several ranks as on one, bit for bit, with t
         contract::BodyOptions body = body_of(2, cloud);
         body.crack = true;
         body.conditions += "[initial]\nvelocity = [\"0.15*(x - 12)/12\", \"0.1*sin(x/3)*(y - 9)/9\"]\n" + damage;
-        body.integrator = "type = \"verlet\"\nend_time = 4.0\ntime_step = 0.05";
+        body.integrator = "type = \"verlet\"\nend_time = 3.0\ntime_step = 0.1";
         compare(contract::scene_text(body, kinematics), {2, 3}, true);
       }
 }
@@ -192,7 +192,7 @@ TEST_CASE("partition: bonds stay on several ranks as on one, bit for bit") {
             "\"critical_stretch\"\nstretch = 0.02\n"
             "second_law = true\n" +
             more;
-        body.integrator = "type = \"verlet\"\nend_time = 3.0\ntime_step = 0.05";
+        body.integrator = "type = \"verlet\"\nend_time = 3.0\ntime_step = 0.1";
         compare(contract::scene_text(body, kinematics), {2, 3}, true);
       }
 }
@@ -229,8 +229,8 @@ TEST_CASE("partition: tractions and pressures on several ranks, beside planes of
 TEST_CASE("partition: statics without a matrix on several ranks is that on one") {
   for (const std::string integrator :
        {"type = \"jfnk\"\npreconditioner = \"none\"\nsteps = 1\ntolerance = 1e-9", "type = \"jfnk\"\npreconditioner = \"companion\"\nsteps = 2\ntolerance = 1e-9",
-        "type = \"kinsol\"\npreconditioner = \"companion\"\nsteps = 1\ntolerance = 1e-9", "type = \"kinsol\"\nstrategy = \"fixed_point\"\nsteps = 1\ntolerance = 1e-4\nmax_iterations = 4000",
-        "type = \"dynamic_relaxation\"\nsteps = 1\ntolerance = 1e-6"})
+        "type = \"kinsol\"\npreconditioner = \"companion\"\nsteps = 1\ntolerance = 1e-9", "type = \"kinsol\"\nstrategy = \"fixed_point\"\nsteps = 1\ntolerance = 1e-2\nmax_iterations = 4000",
+        "type = \"dynamic_relaxation\"\nsteps = 1\ntolerance = 1e-3"})
     for (const bool cloud : {false, true}) {
       INFO(integrator, ", ", std::string(cloud ? "cloud" : "lattice"));
       contract::BodyOptions body = body_of(2, cloud);
@@ -271,7 +271,7 @@ TEST_CASE("partition: mixed systems of displacements and pressures on several ra
       body.material = fmt::format("type = \"neo_hookean\"\nshear_modulus = 1.0\nbulk_modulus = {}", bulk);
       body.two_materials = false;
       body.crack = what == "bonds";
-      body.integrator = fmt::format("type = \"jfnk\"\npreconditioner = \"{}\"\nsteps = 2\ntolerance = 1e-9", what == "space" ? "auto" : "mixed");
+      body.integrator = fmt::format("type = \"jfnk\"\npreconditioner = \"{}\"\nsteps = {}\ntolerance = 1e-7", what == "space" ? "auto" : "mixed", what == "bonds" ? 2 : 1);
       if (what == "symmetry") body.conditions += "[[symmetry]]\naxis = \"y\"\n";
       if (what == "periodic") body.conditions += "[[periodic]]\naxis = \"y\"\n";
       const auto replace = [&](const std::string& text, const std::string& other) {
