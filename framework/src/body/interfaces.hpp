@@ -36,14 +36,10 @@ struct Interfaces {
   bool empty() const noexcept { return all.empty(); }
 };
 
-/// Those of a body. material: of its points, by input number, those of images after them; equal numbers where laws and constants
-/// are equal. sources: input numbers of what the images are images of. Distances are known up to `reach` [m].
+/// Those of a body, or of this rank's part of a body, between any two of its materials on whatever rank. material: of its points, by input
+/// number, also of far points, those of images after them; equal numbers where laws and constants are equal. sources: input numbers of what the
+/// images are images of. Distances are known up to `reach` [m]. All ranks that have a part must call it.
 Interfaces find_interfaces(const Body& body, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
                            double reach);
-
-/// The same of a body that no rank has as a whole: all by the input numbers of the part, also of far points. All ranks must call it;
-/// each of them knows which materials meet anywhere.
-Interfaces find_local_interfaces(const Body& part, std::span<const std::uint16_t> material, std::span<const std::int32_t> sources,
-                                 double reach);
 
 }  // namespace perikit

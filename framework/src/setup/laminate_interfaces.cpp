@@ -118,14 +118,4 @@ Interfaces build_interfaces(const Scene& scene, const PartFactory& factory, cons
   return out;
 }
 
-Interfaces build_local_interfaces(const Scene& scene, const PartFactory& factory, const Formulation& formulation,
-                                  const Body& part, std::vector<std::uint16_t> material, std::span<const std::int32_t> sources) {
-  Interfaces out;
-  if (!interfaces_wanted(scene)) return out;
-  prepare_materials(scene, sources, material, part);
-  out = find_local_interfaces(part, material, sources, reach_of_interfaces(part));
-  keep_laminates(scene, factory, formulation, part.space(), out);
-  return out;
-}
-
 }  // namespace perikit

@@ -73,7 +73,7 @@ Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulat
       parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
     }
     beyond.interfaces = std::make_shared<const Interfaces>(
-        build_local_interfaces(scene, factory, formulation, *parts.body, std::move(local.material), beyond.images.source));
+        build_interfaces(scene, factory, formulation, *parts.body, std::move(local.material), beyond.images.source));
     return beyond;
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, "body", error.what());
