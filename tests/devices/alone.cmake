@@ -1,20 +1,26 @@
-# Compiles the physics of a law alone and looks at what it calls. Needs: law (its header), source, build, compilers (separated by |), nm, folder.
+# Compiles the physics of a law, or a file of formulas, alone and looks at what it calls. Needs: law (its header) or formulas (a file), source, build, compilers
+# (separated by |), nm, folder.
 cmake_minimum_required(VERSION 3.25)
-file(STRINGS ${law} struct REGEX "^struct [A-Za-z]+ {" LIMIT_COUNT 1)
-string(REGEX REPLACE "^struct ([A-Za-z]+) {.*" "\\1" class "${struct}")
-if(NOT class)
-  message(FATAL_ERROR "${law} has no law: struct Name {")
-endif()
 file(MAKE_DIRECTORY ${folder})
-configure_file(${source}/tests/devices/law.cpp.in ${folder}/law.cpp @ONLY)
+if(DEFINED law)
+  file(STRINGS ${law} struct REGEX "^struct [A-Za-z]+ {" LIMIT_COUNT 1)
+  string(REGEX REPLACE "^struct ([A-Za-z]+) {.*" "\\1" class "${struct}")
+  if(NOT class)
+    message(FATAL_ERROR "${law} has no law: struct Name {")
+  endif()
+  set(formulas ${folder}/law.cpp)
+  configure_file(${source}/tests/devices/law.cpp.in ${formulas} @ONLY)
+else()
+  cmake_path(GET formulas STEM class)
+endif()
 string(REPLACE "|" ";" compilers "${compilers}")
 foreach(compiler IN LISTS compilers)
-  execute_process(COMMAND ${compiler} -std=c++20 -O2 -fno-exceptions -fno-rtti -I${source}/framework/include -I${build}/framework/include -c ${folder}/law.cpp -o ${folder}/law.o
+  execute_process(COMMAND ${compiler} -std=c++20 -O2 -fno-exceptions -fno-rtti -I${source}/framework/include -I${source}/framework/src -I${build}/framework/include -c ${formulas} -o ${folder}/alone.o
                   RESULT_VARIABLE failed ERROR_VARIABLE errors)
   if(failed)
-    message(FATAL_ERROR "${compiler} does not compile ${law} alone:\n${errors}")
+    message(FATAL_ERROR "${compiler} does not compile ${class} alone:\n${errors}")
   endif()
-  execute_process(COMMAND ${nm} -u ${folder}/law.o OUTPUT_VARIABLE calls COMMAND_ERROR_IS_FATAL ANY)
+  execute_process(COMMAND ${nm} -u ${folder}/alone.o OUTPUT_VARIABLE calls COMMAND_ERROR_IS_FATAL ANY)
   string(REGEX MATCHALL "[A-Za-z_][A-Za-z0-9_]+" calls "${calls}")
   foreach(call IN LISTS calls)
     # Functions of one number or two, of double and float; copies of memory; protectors of the stack that a distribution turns on.

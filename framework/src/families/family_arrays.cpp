@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
+#include "core/dimension.hpp"
 #include "families/reproducing_kernel.hpp"
-#include "families/shape_tensor.hpp"
+#include "families/stencils.hpp"
 
 namespace perikit {
 
@@ -36,15 +37,16 @@ FamilyView FamilyArrays::view(double horizon) const noexcept {
 
 int point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
   if (order > 1 && !family.fragment) return reproducing_kernel(family, horizon, order, g);
-  const int d = family.dimension;
-  g.assign(static_cast<std::size_t>(family.bonds * d), 0.0);
-  for (int k = 0; k < family.bonds; ++k)
-    for (int e = 0; e < d; ++e)
-      for (int a = 0; a < d; ++a) {
-        const auto bond = static_cast<std::size_t>(k);
-        g[static_cast<std::size_t>(k * d + e)] +=
-            family.omega[bond] * family.volume[bond] * family.inverse_shape[symmetric_index(d, a, e)] * family.xi[a][bond];
-      }
+  g.assign(static_cast<std::size_t>(family.bonds * family.dimension), 0.0);
+  with_dimension(family.dimension, [&](auto d) {
+    constexpr std::size_t D = d;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k) {
+      double xi[D], of_bond[D];
+      for (std::size_t e = 0; e < D; ++e) xi[e] = family.xi[e][k];
+      point_stencil<d>(family.omega[k], family.volume[k], family.inverse_shape, xi, of_bond);
+      std::copy_n(of_bond, D, &g[k * D]);
+    }
+  });
   return family.inverse_shape[0] != 0;
 }
 

@@ -1,11 +1,11 @@
 #pragma once
 /// The bond shape: H_b = A (I - xi (x) g) + u_b (x) g, A = (1 - s) Hbar_i + s Hbar_j, and its adjoint, t = WP g on u_b and WP - t (x) xi on A.
-/// The formula stands in bond_shape_row and bond_shape_row_adjoint alone; whoever needs it (clouds, lattices, assembly) reads and writes around them.
+/// The formula stands in families/stencils.hpp; whoever needs it (clouds, lattices, assembly) reads and writes around it.
 
 #include <cstdint>
 
+#include "families/stencils.hpp"
 #include "perikit/core/simd.hpp"
-#include "perikit/core/tensor.hpp"
 #include "perikit/operators/laws.hpp"
 
 namespace perikit {
@@ -30,22 +30,6 @@ template <bool per_slot>
 inline Pack bond_value(const double* x, int lane) noexcept {
   if constexpr (per_slot) return Pack(x[lane / static_cast<int>(padding)]);
   else return Pack::load(x + lane);
-}
-
-/// Row c of H_b, H_ce = A_ce + (du_c - A_ck xi_k) g_e, for numbers or packs.
-template <int D, class T>
-void bond_shape_row(const T (&A)[D], T du, const T (&xi)[D], const T (&g)[D], T (&H)[D]) noexcept {
-  PERIKIT_UNROLL for (int e = 0; e < D; ++e) du -= A[e] * xi[e];
-  PERIKIT_UNROLL for (int e = 0; e < D; ++e) H[e] = A[e] + du * g[e];
-}
-
-/// Its adjoint: t_c = WP_ce g_e acts on du_c, S_ce = WP_ce - t_c xi_e on A_ce. P: row c of WP, and S in its place.
-template <int D, class T>
-T bond_shape_row_adjoint(T (&P)[D], const T (&xi)[D], const T (&g)[D]) noexcept {
-  T t = P[0] * g[0];
-  PERIKIT_UNROLL for (int e = 1; e < D; ++e) t += P[e] * g[e];
-  PERIKIT_UNROLL for (int e = 0; e < D; ++e) P[e] = P[e] - t * xi[e];
-  return t;
 }
 
 /// Bits of the lanes l ... l + pack_width - 1 of a mask.

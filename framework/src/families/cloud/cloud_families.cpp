@@ -8,7 +8,7 @@
 #include "body/family_limit.hpp"
 #include "core/each_once.hpp"
 #include "families/cloud/cloud_rows.hpp"
-#include "families/shape_tensor.hpp"
+#include "families/stencils.hpp"
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/simd.hpp"
 
@@ -24,8 +24,7 @@ namespace {
 /// K += w xi (x) xi
 template <int D>
 [[gnu::noinline]] void add_shape(double w, const Row& xi, double* K) noexcept {
-  for (int a = 0; a < D; ++a)
-    for (int e = a; e < D; ++e) K[symmetric_index(D, a, e)] += w * xi[a] * xi[e];
+  add_to_shape_tensor<D>(w, xi, K);
 }
 
 double squared(const Row& x) noexcept { return x[0] * x[0] + x[1] * x[1] + x[2] * x[2]; }

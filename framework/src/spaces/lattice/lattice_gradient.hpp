@@ -14,7 +14,7 @@
 /// (s runs over intact bonds; dead cells hold u = 0 and Q = 0, so that free surfaces need no masks but the first moment m.)
 
 #include "families/lattice/lattice_families.hpp"
-#include "families/shape_tensor.hpp"
+#include "families/stencils.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -43,11 +43,9 @@ class LatticeOperator {
       for (int c = 0; c < D; ++c) {
         Pack s[D];
         for (int e = 0; e < D; ++e) s[e] = Pack::load(S + static_cast<std::size_t>(c * D + f_.grid.axis[e]) * s_stride + l);
-        for (int e = 0; e < D; ++e) {
-          Pack q(0.0);
-          for (int k = 0; k < D; ++k) q += s[k] * inverse[symmetric_index(D, k, e)];
-          q.store(Q.component(c * D + e) + at + l);
-        }
+        Pack q[D];
+        times_inverse<D>(s, inverse, q);
+        for (int e = 0; e < D; ++e) q[e].store(Q.component(c * D + e) + at + l);
       }
     }
   }

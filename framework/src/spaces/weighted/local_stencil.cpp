@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "families/shape_tensor.hpp"
+#include "families/stencils.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -389,14 +389,13 @@ void LocalStencil<D>::adjoint(double* const (&t)[D]) noexcept {
 
 template <int D>
 void LocalStencil<D>::expand_one(int q, double* g) const {
-  const auto row = static_cast<std::size_t>(q);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
-    for (std::size_t e = 0; e < D; ++e) {
-      double sum = 0;
-      for (std::size_t a = 0; a < D; ++a)
-        sum += inverse(q, symmetric_index(D, static_cast<int>(a), static_cast<int>(e))) * lever_[a * row_ + k];
-      g[k * D + e] = omega_[row * row_ + k] * sum;
-    }
+  double inverse[symmetric_components(D)], b[D], of_bond[D];
+  for (int c = 0; c < symmetric_components(D); ++c) inverse[c] = this->inverse(q, c);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k) {
+    for (std::size_t a = 0; a < D; ++a) b[a] = lever_[a * row_ + k];
+    weighted_stencil<D>(influences(q)[k], inverse, b, of_bond);
+    std::copy_n(of_bond, D, g + k * D);
+  }
 }
 
 template <int D>

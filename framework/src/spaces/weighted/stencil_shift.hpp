@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "families/family_arrays.hpp"
+#include "families/stencils.hpp"
 #include "perikit/core/field.hpp"
 
 namespace perikit {
@@ -26,11 +27,9 @@ void each_shift(const FamilyArrays& family, const double* omega, const double* g
   }
   for (std::size_t k = 0; k < bonds; ++k) {
     if (omega[k] == 0) continue;
-    for (int c = 0; c < D; ++c) {
-      double z = difference(k, c);
-      for (int e = 0; e < D; ++e) z -= G[c * D + e] * family.xi[e][k];
-      visit(k, static_cast<std::size_t>(c), omega[k] * family.volume[k] * z);
-    }
+    double xi[D];
+    for (int e = 0; e < D; ++e) xi[e] = family.xi[e][k];
+    for (int c = 0; c < D; ++c) visit(k, static_cast<std::size_t>(c), omega[k] * family.volume[k] * bond_residual<D>(difference(k, c), G + c * D, xi));
   }
 }
 
