@@ -1,27 +1,14 @@
 #pragma once
 /// Assembled tangents: K = sum_q W_q g_q . A(F_q) . g_q with the evaluation points and stencils of the spaces, never by probing.
 
-#include <functional>
-#include <memory>
 #include <mutex>
-#include <vector>
 
 #include "assembly/block_rows.hpp"
-#include "operators/material_points.hpp"
+#include "core/per_thread.hpp"
 #include "perikit/core/block_matrix.hpp"
-#include "perikit/core/parallel.hpp"
 #include "perikit/model/configuration.hpp"
 
 namespace perikit {
-
-/// What the laws of a space remember, for assemblies.
-struct RememberedPoints {
-  const MaterialPoints& points;
-  /// Where something is remembered: the numbers of the evaluation points, row by row those of a point (Formulation::parts of them) or of its bonds;
-  /// -1: there is none. To be asked again after bonds have changed.
-  std::function<std::vector<std::int64_t>(const BlockRows& rows)> numbers;
-  std::vector<std::int64_t> numbers_of(const BlockRows& rows) const { return points.remember() ? numbers(rows) : std::vector<std::int64_t>(); }
-};
 
 /// What one term adds to a tangent.
 class Assembly {
@@ -48,20 +35,6 @@ class FirstBad {
  private:
   std::mutex guard_;
   std::int64_t point_ = -1;
-};
-
-/// One T per thread, made on first use.
-template <class T>
-class PerThread {
- public:
-  template <class Make>
-  void prepare(Make&& make) {
-    while (all_.size() < static_cast<std::size_t>(thread_count())) all_.push_back(make());
-  }
-  T& mine() noexcept { return *all_[static_cast<std::size_t>(thread_index())]; }
-
- private:
-  std::vector<std::unique_ptr<T>> all_;
 };
 
 }  // namespace perikit

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 
-#include "cloud_balance/shift.hpp"
 #include "families/cloud/cloud_rows.hpp"
-#include "operators/laminates.hpp"
-#include "spaces/bond_shape.hpp"
+#include "spaces/evaluation_points.hpp"
 
 namespace perikit {
 
@@ -22,16 +20,12 @@ void over_rows(std::size_t rows, Body&& body) {
 }  // namespace
 
 template <int D>
-BondAssembly<D>::BondAssembly(const SpaceParts& parts, RememberedPoints remembered, const BlockRows& rows)
-    : rows_(rows),
-      remembered_(std::move(remembered)),
-      laws_(parts.laws),
+BondAssembly<D>::BondAssembly(const SpaceParts& parts, const LawsOfSpace& laws, const BlockRows& rows)
+    : parts_(parts),
+      laws_(laws),
+      rows_(rows),
       formulation_(parts.formulation),
-      factors_(parts.factors),
-      shift_(parts.shift),
-      far_share_(formulation_.far_share),
-      symmetric_(formulation_.pair_symmetric && !formulation_.selective() && parts.share),
-      interfaces_(parts.interfaces),
+      symmetric_(parts.bonds_once() && !formulation_.selective()),
       blocks_(rows.size(), rows.body().block_points()),
       colouring_(cloud_reach(rows.lists(), blocks_)) {
   read_bonds();
@@ -39,92 +33,37 @@ BondAssembly<D>::BondAssembly(const SpaceParts& parts, RememberedPoints remember
 
 template <int D>
 void BondAssembly<D>::read_bonds() {
-  numbers_ = remembered_.numbers_of(rows_);
   const std::size_t rows = rows_.size();
   bond_.resize(rows_.bonds());
   own_gradient_.assign(D * rows, 0.0);
   volume_share_.assign(rows, 0.0);
-  struct Scratch {
-    FamilyArrays family;
-    AlignedVector<double> share, correction;
-    std::vector<double> gradient;
-  };
-  PerThread<Scratch> memory;
-  memory.prepare([] { return std::make_unique<Scratch>(); });
+  PerThread<EvaluationPoints<D>> readers;
+  readers.prepare([&] { return std::make_unique<EvaluationPoints<D>>(parts_); });
   over_rows(rows, [&](std::size_t i) {
-    Scratch& s = memory.mine();
-    rows_.load(i, s.family);
-    bond_shares(rows_.families(), rows_.point(i), formulation_.weight, s.family, s.share);
-    s.correction.assign(D * s.family.size, 0.0);
-    formulation_.bond->correction(s.family.view(rows_.body().horizon()), s.correction.data(), s.family.size);
-    point_gradient(s.family, rows_.body().horizon(), formulation_.order, s.gradient);
-    if (shift_.data) shift_gradient(s.family, shift_, s.gradient);
-    const bool regular = std::any_of(s.gradient.begin(), s.gradient.end(), [](double g) { return g != 0; });
+    EvaluationPoints<D>& points = readers.mine();
+    points.read(rows_.point(i));
+    const double* const g = points.own();
+    const bool regular = std::any_of(g, g + D * points.bonds(), [](double x) { return x != 0; });
     volume_share_[i] = regular ? rows_.families().remaining_influence(rows_.point(i)) : 0.0;
     const auto neighbours = rows_.neighbours(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       Bond& bond = bond_[rows_.first(i) + k];
+      const int q = static_cast<int>(k);
+      points.correction(q, bond.correction);
       for (std::size_t e = 0; e < D; ++e) {
-        bond.xi[e] = s.family.xi[e][k];
-        bond.correction[e] = s.correction[e * s.family.size + k];
-        bond.gradient[e] = s.gradient[k * D + e];
+        bond.xi[e] = points.family().xi[e][k];
+        bond.gradient[e] = g[k * D + e];
         own_gradient_[D * i + e] -= bond.gradient[e];
       }
-      bond.weight = rows_.volume(i) * s.share[k] * (factors_.empty() ? 1.0 : factors_[rows_.first(i) + k]);
+      bond.weight = points.weight(q);
+      bond.shares = points.shares(q);
       const auto j = static_cast<std::size_t>(neighbours[k]);
-      bond.shares = end_shares(rows_.families(), far_share_, rows_.point(i), rows_.point(j));
-      if (bond.shares.none()) bond.weight = 0;
       const auto back = rows_.neighbours(j);
       bond.reverse =
           rows_.first(j) +
           static_cast<std::size_t>(std::lower_bound(back.begin(), back.end(), static_cast<std::int32_t>(i)) - back.begin());
     }
   });
-  if (interfaces_) read_laminates();
-}
-
-template <int D>
-template <class Value>
-void BondAssembly<D>::gradient_of(std::size_t i, std::size_t k, const Value& value, double* g) const noexcept {
-  const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
-  const auto of_point = [&](std::size_t row, double* H) {
-    const double own = value(rows_.point(row));
-    const Bond* bond = bond_.data() + rows_.first(row);
-    for (const std::int32_t n : rows_.neighbours(row)) {
-      const double difference = value(rows_.point(static_cast<std::size_t>(n))) - own;
-      for (std::size_t e = 0; e < D; ++e) H[e] += bond->gradient[e] * difference;
-      ++bond;
-    }
-  };
-  double near[D] = {}, far[D] = {}, A[D];
-  of_point(i, near);
-  if (far_share_ > 0) of_point(j, far);
-  const EndShares& shares = bond_[k].shares;
-  for (std::size_t e = 0; e < D; ++e) A[e] = shares.near * near[e] + shares.far * far[e];
-  double H[D];
-  bond_shape_row<D>(A, value(rows_.point(j)) - value(rows_.point(i)), bond_[k].xi, bond_[k].correction, H);
-  std::copy_n(H, D, g);
-}
-
-template <int D>
-void BondAssembly<D>::read_laminates() {
-  laminate_of_.assign(bond_.size(), -1);
-  laminate_.clear();
-  const std::size_t rows = rows_.size();
-  std::vector<std::vector<std::pair<std::size_t, LaminatePoint>>> found(rows);
-  over_rows(rows, [&](std::size_t i) {
-    const auto p = static_cast<std::int32_t>(rows_.point(i));
-    if (std::ranges::none_of(interfaces_->all, [&](const Interface& interface) { return interface.find(p) >= 0; })) return;
-    for (std::size_t k = rows_.first(i); k < rows_.first(i + 1); ++k) {
-      LaminatePoint point;
-      if (laminate_by_stencil(D, *interfaces_, p, [&](const auto& value, double* g) { gradient_of(i, k, value, g); }, point)) found[i].push_back({k, point});
-    }
-  });
-  for (const auto& of_row : found)
-    for (const auto& [k, point] : of_row) {
-      laminate_of_[k] = static_cast<std::int32_t>(laminate_.size());
-      laminate_.push_back(point);
-    }
 }
 
 template <int D>
@@ -145,7 +84,7 @@ void BondAssembly<D>::point_gradients(std::size_t row, ConstFieldView u) noexcep
 
 template <int D>
 bool BondAssembly<D>::evaluated_once(std::size_t i, std::size_t j) const noexcept {
-  return symmetric_ && laws_.same(rows_.point(i), rows_.point(j));
+  return symmetric_ && parts_.laws.same(rows_.point(i), rows_.point(j));
 }
 
 template <int D>
@@ -154,8 +93,7 @@ void BondAssembly<D>::add_lane(std::size_t i, std::size_t k, ConstFieldView u, M
   const auto j = static_cast<std::size_t>(rows_.lists().neighbour[k]);
   const std::size_t p = rows_.point(i), q = rows_.point(j);
   const double weight = bond.weight + (evaluated_once(i, j) ? bond_[bond.reverse].weight : 0.0);
-  const int lane = m.batch.add(static_cast<std::int32_t>(p), weight, volume_share_[i], numbers_.empty() ? -1 : numbers_[k]);
-  if (interfaces_ && laminate_of_[k] >= 0) m.batch.add_laminate(laminate_[static_cast<std::size_t>(laminate_of_[k])]);
+  const int lane = m.batch.add(p, static_cast<std::int32_t>(q), 0, weight, volume_share_[i]);
   m.bond_of_lane.push_back(k);
   m.row_of_lane.push_back(i);
   const double* own = Hbar_.data() + entries * i;
@@ -297,7 +235,7 @@ void BondAssembly<D>::condense(std::size_t row, BlockMatrix& K, Memory& m) const
 
   m.places.open(K, row);
   // Only where the far end has a share do gradients two bonds away matter; the others have none in C.
-  const std::size_t gradients = far_share_ > 0 ? near.size() : bonds + 1;
+  const std::size_t gradients = formulation_.far_share > 0 ? near.size() : bonds + 1;
   for (std::size_t n = 0; n < near.size(); ++n) {
     const double* C = m.C.data() + strip * n;
     double* block = m.places.block(K, near[n], entries);
@@ -319,8 +257,8 @@ template <int D>
 std::int64_t BondAssembly<D>::add(const Configuration& at, BlockMatrix& K) {
   const ConstFieldView u = at.u();
   const std::size_t rows = rows_.size();
-  if (!laws_.symmetric_tangent()) K.symmetric = false;
-  memory_.prepare([&] { return std::make_unique<Memory>(remembered_.points, formulation_.selective()); });
+  if (!parts_.laws.symmetric_tangent()) K.symmetric = false;
+  memory_.prepare([&] { return std::make_unique<Memory>(laws_, formulation_.selective()); });
   Hbar_.resize(entries * rows);
   diagonal_.resize(coupling * rows);
   off_diagonal_.resize(coupling * rows_.bonds());

@@ -2,7 +2,6 @@
 #include "assembly/assembly.hpp"
 #include "assembly/block_pattern.hpp"
 #include "assembly/tangent_batch.hpp"
-#include "body/interfaces.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "spaces/bond_ends.hpp"
 #include "spaces/evaluation_space.hpp"
@@ -15,7 +14,7 @@ namespace perikit {
 template <int D>
 class BondAssembly final : public Assembly {
  public:
-  BondAssembly(const SpaceParts& parts, RememberedPoints remembered, const BlockRows& rows);
+  BondAssembly(const SpaceParts& parts, const LawsOfSpace& laws, const BlockRows& rows);
 
   std::int64_t add(const Configuration& at, BlockMatrix& K) override;
   void bonds_changed() override { read_bonds(); }
@@ -28,7 +27,7 @@ class BondAssembly final : public Assembly {
   static constexpr std::size_t strip = slots * entries;
 
   struct Memory {
-    Memory(const MaterialPoints& points, bool selective) : batch(points, selective) {}
+    Memory(const LawsOfSpace& laws, bool selective) : batch(laws, selective) {}
     TangentBatch<D> batch;
     std::vector<std::size_t> bond_of_lane, row_of_lane;
     Reach reach;
@@ -54,23 +53,11 @@ class BondAssembly final : public Assembly {
   void couple(std::size_t i, std::size_t k, int lane, const TangentBatch<D>& batch) noexcept;
   void condense(std::size_t row, BlockMatrix& K, Memory& m) const;
 
-  void read_laminates();
-  /// of the bond k of row i with value(p) by point.
-  template <class Value>
-  void gradient_of(std::size_t i, std::size_t k, const Value& value, double* g) const noexcept;
-
+  SpaceParts parts_;
+  LawsOfSpace laws_;
   const BlockRows& rows_;
-  RememberedPoints remembered_;
-  std::vector<std::int64_t> numbers_;   ///< see RememberedPoints
-  const Laws& laws_;
   const Formulation& formulation_;
-  std::span<const double> factors_;  ///< of the weights; empty: 1
-  ConstFieldView shift_;             ///< of point gradients; without data: none
-  double far_share_;
   bool symmetric_;
-  std::shared_ptr<const Interfaces> interfaces_;
-  std::vector<std::int32_t> laminate_of_;          ///< by bond; -1: none. Empty without interfaces
-  std::vector<LaminatePoint> laminate_;
   std::vector<Bond> bond_;
   AlignedVector<double> own_gradient_;             ///< g_ii by row, D each
   AlignedVector<double> Hbar_;                     ///< by row

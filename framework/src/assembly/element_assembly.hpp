@@ -4,7 +4,6 @@
 #include "assembly/assembly.hpp"
 #include "assembly/point_element.hpp"
 #include "assembly/tangent_batch.hpp"
-#include "body/interfaces.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "spaces/evaluation_space.hpp"
 
@@ -14,17 +13,18 @@ namespace perikit {
 template <int D>
 class ElementAssembly final : public Assembly {
  public:
-  ElementAssembly(const SpaceParts& parts, RememberedPoints remembered, const BlockRows& rows);
+  ElementAssembly(const SpaceParts& parts, const LawsOfSpace& laws, const BlockRows& rows);
 
   std::int64_t add(const Configuration& at, BlockMatrix& K) override;
   /// Elements of points that are not whole are made anew each time.
-  void bonds_changed() override { numbers_ = remembered_.numbers_of(rows_); }
-  std::size_t bytes() const noexcept override { return numbers_.size() * sizeof(std::int64_t); }
+  void bonds_changed() override {}
+  std::size_t bytes() const noexcept override { return 0; }
 
  private:
   /// Memory of one thread.
   struct Memory {
-    Memory(const MaterialPoints& points, bool selective) : batch(points, selective) {}
+    Memory(const SpaceParts& parts, const LawsOfSpace& laws) : points(parts), batch(laws, parts.formulation.selective()) {}
+    EvaluationPoints<D> points;
     TangentBatch<D> batch;
     ElementScratch<D> scratch;
     std::vector<PointElement<D>> elements;          ///< of points that are not whole
@@ -37,11 +37,10 @@ class ElementAssembly final : public Assembly {
   std::int64_t fill_rows(std::size_t first, std::size_t last, const Configuration& at, BlockMatrix& K, Memory& m) const;
   void add_lanes(std::size_t row, const PointElement<D>& element, ConstFieldView u, Memory& m) const;
 
+  SpaceParts parts_;
+  LawsOfSpace laws_;
   const BlockRows& rows_;
-  RememberedPoints remembered_;
-  std::vector<std::int64_t> numbers_;   ///< see RememberedPoints
-  std::shared_ptr<const Interfaces> interfaces_;
-  ElementShape shape_;
+  const Formulation& formulation_;
   std::optional<PointElement<D>> whole_;  ///< of rows with the whole family
   CloudBlocks blocks_;
   Colouring colouring_;

@@ -54,7 +54,7 @@ class LatticeVolumes final : public VolumetricState<D> {
         felt_rows_(felt_rows(families_, felt_)) {}
 
   std::int64_t linearise(ConstFieldView u) override {
-    this->memory_.prepare([] { return std::make_unique<typename Base::Memory>(); });
+    this->memory_.prepare([&] { return std::make_unique<typename Base::Memory>(this->parts_); });
     FirstBad bad;
     over_chunks(felt_chunks_, u, [&](const LatticeChunk& chunk, const double* H) {
       const LatticePattern& pattern = families_.pattern(chunk);
@@ -109,7 +109,7 @@ class LatticeVolumes final : public VolumetricState<D> {
   }
 
   void squares(ConstFieldView c, FieldView q) const override {
-    this->memory_.prepare([] { return std::make_unique<typename Base::Memory>(); });
+    this->memory_.prepare([&] { return std::make_unique<typename Base::Memory>(this->parts_); });
     this->over_rows(this->roles_.own, [&](std::size_t i) { q.data[this->rows_.point(i)] = square(i, c, this->memory_.mine()); });
   }
 
@@ -134,15 +134,15 @@ class LatticeVolumes final : public VolumetricState<D> {
 
   /// Row i of B, squared: b_ij = Fbar_i^-T g_ij by neighbour, b_ii = -sum_j b_ij.
   double square(std::size_t i, ConstFieldView c, typename Base::Memory& m) const {
-    this->rows_.load(i, m.family);
-    point_gradient(m.family, this->rows_.body().horizon(), 1, m.g);
     const auto neighbours = this->rows_.neighbours(i);
     const std::size_t p = this->rows_.point(i);
+    m.points.read(p);
+    const double* const g = m.points.own();
     double own[D] = {}, sum = 0;
     for (std::size_t k = 0; k < neighbours.size(); ++k)
       for (int a = 0; a < D; ++a) {
         double b = 0;
-        for (int e = 0; e < D; ++e) b += inverse_transpose_.component(a * D + e)[p] * m.g[k * D + static_cast<std::size_t>(e)];
+        for (int e = 0; e < D; ++e) b += inverse_transpose_.component(a * D + e)[p] * g[k * D + static_cast<std::size_t>(e)];
         own[a] -= b;
         sum += b * b * c.component(a)[this->rows_.point(static_cast<std::size_t>(neighbours[k]))];
       }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "cloud_balance/shift.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
@@ -11,11 +10,11 @@ namespace {
 
 constexpr std::size_t tile = padding;
 
-/// Row q of the element from the gradient over bonds, g(k, e); the owner's entry makes the sum zero.
+/// Row q of all of an element from the gradient over bonds, g(k, e); the owner's entry makes the sum zero.
 template <int D, class Gradient>
-void write_point(PointElement<D>& out, int q, Gradient&& gradient) {
+void write_point(const PointElement<D>& out, AlignedVector<double>& all, int q, Gradient&& gradient) {
   for (int e = 0; e < D; ++e) {
-    double* to = out.g.data() + static_cast<std::size_t>(q * D + e) * out.width;
+    double* to = all.data() + static_cast<std::size_t>(q * D + e) * out.width;
     double sum = 0;
     for (int k = 0; k < out.nodes - 1; ++k) sum += to[k < out.own ? k : k + 1] = gradient(k, e);
     to[out.own] = -sum;
@@ -49,7 +48,7 @@ void scatter_element(const std::vector<std::int32_t>& nodes, const double* S, st
 }
 
 template <int D>
-void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out, ElementScratch<D>& s) {
+void build_element(const BlockRows& rows, const Formulation& formulation, std::size_t row, EvaluationPoints<D>& points, PointElement<D>& out) {
   const auto neighbours = rows.neighbours(row);
   out.nodes = static_cast<int>(neighbours.size()) + 1;
   out.own = static_cast<int>(std::lower_bound(neighbours.begin(), neighbours.end(), static_cast<std::int32_t>(row)) - neighbours.begin());
@@ -57,47 +56,33 @@ void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t
   out.weight.clear();
   out.which.clear();
   out.test.clear();
+  out.g.clear();
   out.points = 0;
   if (neighbours.empty()) {  // nothing to stretch
     out.g.assign(D * out.width, 0.0);
     return;
   }
-  rows.load(row, s.family);
-  const std::size_t p = rows.point(row);
-  const double intact = rows.volume(row) * (1 - rows.families().damage(p)), horizon = rows.body().horizon();
-  const Formulation& formulation = shape.formulation;
-  if (formulation.point) {
-    point_gradient(s.family, horizon, formulation.order, s.gradient);
-    if (shape.shift.data) shift_gradient(s.family, shape.shift, s.gradient);
-    out.g.assign(D * out.width, 0.0);
-    write_point<D>(out, 0, [&](int k, int e) { return s.gradient[static_cast<std::size_t>(k * D + e)]; });
-    out.points = 1;
-    out.weight.push_back(intact);
-    out.which.push_back(0);
-    return;
-  }
-  bond_shares(rows.families(), p, formulation.weight, s.family, s.share);
-  s.stencil.build({&formulation, horizon, shape.shift}, s.family, s.share.data(), 0, nullptr, rows.families().normaliser(p, BondWeight::volume));
-  s.stencil.expand(s.gradient);
-  const int owners = formulation.selective() ? 1 : 0;
-  const std::vector<double>& tested = s.stencil.tested();
-  out.g.assign(static_cast<std::size_t>(s.stencil.points() * D) * out.width, 0.0);
-  if (!tested.empty()) out.test = out.g;
-  for (int q = 0, to = 0; q < s.stencil.points(); ++q) {
-    const double share = s.stencil.share(q);
-    if (q >= owners && share == 0) continue;  // a dropped part
-    const auto gradient = [&](int k, int e) { return s.gradient[static_cast<std::size_t>((q * s.stencil.bonds() + k) * D + e)]; };
-    if (!tested.empty()) {
-      out.g.swap(out.test);
-      const int own = q - owners;   // the bond of the evaluation point, the only one that its stress acts on
-      write_point<D>(out, to, [&](int k, int e) { return own < 0 ? gradient(k, e) : k == own ? tested[static_cast<std::size_t>(k)] * gradient(k, e) : 0.0; });
-      out.g.swap(out.test);
-    }
-    write_point<D>(out, to++, gradient);
-    if (q < owners) continue;
-    const double factor = shape.factors.empty() ? 1.0 : shape.factors[rows.first(row) + static_cast<std::size_t>(q - owners)];
-    out.weight.push_back(share * (shape.parts > 0 ? intact : rows.volume(row)) * factor);
-    out.which.push_back(q - owners);
+  points.read(rows.point(row));
+  const std::vector<double>& tested = points.tested();
+  int rows_of_g = 0;
+  // own: the bond of the evaluation point, the only one that its stress acts on where force states are local; -1: the owner's gradient.
+  const auto write = [&](const double* g, int own) {
+    const std::size_t size = static_cast<std::size_t>(++rows_of_g * D) * out.width;
+    const auto gradient = [&](int k, int e) { return g[k * D + e]; };
+    out.g.resize(size, 0.0);
+    write_point<D>(out, out.g, rows_of_g - 1, gradient);
+    if (tested.empty()) return;
+    out.test.resize(size, 0.0);
+    write_point<D>(out, out.test, rows_of_g - 1,
+                   [&](int k, int e) { return own < 0 ? gradient(k, e) : k == own ? tested[static_cast<std::size_t>(k)] * gradient(k, e) : 0.0; });
+  };
+  if (formulation.selective()) write(points.gradient(-1), -1);
+  for (int q = 0; q < points.points(); ++q) {
+    const double weight = points.weight(q);
+    if (weight == 0 && formulation.weighted) continue;  // a dropped part
+    write(points.gradient(q), q);
+    out.weight.push_back(weight);
+    out.which.push_back(q);
     ++out.points;
   }
 }
@@ -169,11 +154,11 @@ void stiffness(const PointElement<D>& element, const TangentBatch<D>& batch, int
 }
 
 template void scatter_element<1>(const std::vector<std::int32_t>&, const double*, std::size_t, bool, BlockMatrix&);
-template void build_element<1>(const BlockRows&, const ElementShape&, std::size_t, PointElement<1>&, ElementScratch<1>&);
+template void build_element<1>(const BlockRows&, const Formulation&, std::size_t, EvaluationPoints<1>&, PointElement<1>&);
 template void scatter_element<2>(const std::vector<std::int32_t>&, const double*, std::size_t, bool, BlockMatrix&);
-template void build_element<2>(const BlockRows&, const ElementShape&, std::size_t, PointElement<2>&, ElementScratch<2>&);
+template void build_element<2>(const BlockRows&, const Formulation&, std::size_t, EvaluationPoints<2>&, PointElement<2>&);
 template void scatter_element<3>(const std::vector<std::int32_t>&, const double*, std::size_t, bool, BlockMatrix&);
-template void build_element<3>(const BlockRows&, const ElementShape&, std::size_t, PointElement<3>&, ElementScratch<3>&);
+template void build_element<3>(const BlockRows&, const Formulation&, std::size_t, EvaluationPoints<3>&, PointElement<3>&);
 template void stiffness<1>(const PointElement<1>&, const TangentBatch<1>&, int, bool, bool, ElementScratch<1>&);
 template void stiffness<2>(const PointElement<2>&, const TangentBatch<2>&, int, bool, bool, ElementScratch<2>&);
 template void stiffness<3>(const PointElement<3>&, const TangentBatch<3>&, int, bool, bool, ElementScratch<3>&);

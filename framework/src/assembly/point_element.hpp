@@ -6,18 +6,10 @@
 
 #include "assembly/block_rows.hpp"
 #include "assembly/tangent_batch.hpp"
-#include "model/formulation.hpp"
 #include "perikit/core/block_matrix.hpp"
-#include "spaces/weighted/local_stencil.hpp"
+#include "spaces/evaluation_points.hpp"
 
 namespace perikit {
-
-struct ElementShape {
-  const Formulation& formulation;
-  int parts = 1;                         ///< evaluation points per point; 0: one per bond
-  std::span<const double> factors = {};  ///< of their weights, as spaces number them; empty: 1
-  ConstFieldView shift = {};             ///< of gradients (spaces/shift.hpp); without data: none
-};
 
 /// The nodes of a row, ascending: its family and the point itself. Returns the place of the point.
 std::size_t element_nodes(const BlockRows& rows, std::size_t row, std::vector<std::int32_t>& nodes);
@@ -42,17 +34,12 @@ struct PointElement {
 /// Reused memory, and the result of `stiffness`.
 template <int D>
 struct ElementScratch {
-  FamilyArrays family;
-  LocalStencil<D> stencil;
-  AlignedVector<double> share;
-  std::vector<double> gradient;
   AlignedVector<double> T;  ///< A g of eight nodes
   AlignedVector<double> K;  ///< [a][b][k][l], width x width each; of symmetric ones tiles of 8 x 8 on and above the diagonal
 };
 
 template <int D>
-void build_element(const BlockRows& rows, const ElementShape& shape, std::size_t row, PointElement<D>& out,
-                   ElementScratch<D>& s);
+void build_element(const BlockRows& rows, const Formulation& formulation, std::size_t row, EvaluationPoints<D>& points, PointElement<D>& out);
 
 /// s.K <- sum_q W_q g_q . A_q . g_q with the tangents of lanes first_lane ... of the batch. symmetric: only tiles of 8 x 8 on and above the diagonal.
 template <int D>

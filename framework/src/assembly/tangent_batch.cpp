@@ -9,10 +9,11 @@
 namespace perikit {
 
 template <int D>
-TangentBatch<D>::TangentBatch(const MaterialPoints& points, bool selective) : points_(points), laws_(points.laws()), selective_(selective) {
+TangentBatch<D>::TangentBatch(const LawsOfSpace& laws, bool selective)
+    : of_(laws), points_(laws.points), laws_(points_.laws()), selective_(selective) {
   laws_.prepare(scratch_, true);
   A_.assign(static_cast<std::size_t>(laws_.components() * laws_.components()) * batch_points, 0.0);
-  state_.assign(points.components() * batch_points, 0.0);
+  state_.assign(points_.components() * batch_points, 0.0);
   if (!selective) return;
   P_.assign(9 * batch_points, 0.0);
   mapped_.assign(9 * batch_points, 0.0);
@@ -23,7 +24,7 @@ TangentBatch<D>::TangentBatch(const MaterialPoints& points, bool selective) : po
 }
 
 template <int D>
-int TangentBatch<D>::add(std::int32_t owner, double weight, double share, std::int64_t number) {
+int TangentBatch<D>::add(std::size_t owner, std::int32_t far, int part, double weight, double share) {
   const int lane = lanes_++;
   if (static_cast<std::size_t>(lane) == owner_.size()) {
     const std::size_t size = owner_.size() + batch_points;
@@ -40,10 +41,13 @@ int TangentBatch<D>::add(std::int32_t owner, double weight, double share, std::i
       bar_.resize(size * entries);
     }
   }
-  owner_[static_cast<std::size_t>(lane)] = owner;
+  owner_[static_cast<std::size_t>(lane)] = static_cast<std::int32_t>(owner);
   weight_[static_cast<std::size_t>(lane)] = weight;
   share_[static_cast<std::size_t>(lane)] = share;
-  if (points_.remember()) number_[static_cast<std::size_t>(lane)] = number;
+  if (!points_.remember() && !of_.laminates) return lane;
+  const PointNumbers number = of_.space.number_of(static_cast<std::int32_t>(owner), far, part);
+  if (points_.remember()) number_[static_cast<std::size_t>(lane)] = number.state;
+  if (const LaminatePoint* const laminate = of_.laminates && number.point >= 0 ? of_.laminates->at(number.point) : nullptr) laminates_.push_back({lane, *laminate});
   return lane;
 }
 

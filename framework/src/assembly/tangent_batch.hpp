@@ -4,11 +4,18 @@
 #include <memory>
 #include <vector>
 
-#include "operators/laminate.hpp"
+#include "operators/laminates.hpp"
 #include "operators/material_points.hpp"
-#include "perikit/operators/laws.hpp"
+#include "spaces/evaluation_space.hpp"
 
 namespace perikit {
+
+/// The laws at the evaluation points of a space: what they remember, and which of the points are laminates (null: none).
+struct LawsOfSpace {
+  const MaterialPoints& points;
+  const EvaluationSpace& space;
+  const Laminates* laminates;
+};
 
 /// Matrices over in-space components, row-major: entry (aD + e, bD + f) couples P_ae with F_bf. With the selective map stresses act on
 /// and depend on Ft, the point's own gradient, and Fbar, the owner's.
@@ -17,17 +24,15 @@ class TangentBatch {
  public:
   static constexpr int components = D * D, entries = components * components;
 
-  TangentBatch(const MaterialPoints& points, bool selective);
+  TangentBatch(const LawsOfSpace& laws, bool selective);
   void clear() noexcept {
     lanes_ = 0;
     laminates_.clear();
   }
   int lanes() const noexcept { return lanes_; }
-  /// A lane for an evaluation point of W = weight [m^3]; its gradients are to be filled in. share: c of the selective map.
-  /// number: of the evaluation point, whose state it has at the beginning of the step; -1: nothing has happened to it.
-  int add(std::int32_t owner, double weight, double share, std::int64_t number = -1);
-  /// The last lane is a laminate.
-  void add_laminate(const LaminatePoint& point) { laminates_.push_back({lanes_ - 1, point}); }
+  /// A lane for an evaluation point of W = weight [m^3], at the bond of `owner` to `far` or, where far is -1, at a part of its family; its gradients are to
+  /// be filled in. It has the state of the beginning of the step. share: c of the selective map.
+  int add(std::size_t owner, std::int32_t far, int part, double weight, double share);
   /// Component aD + e of Ht, and of the owner's Hbar (selective map only).
   double& H(int lane, int component) noexcept { return at(H_, lane, component); }
   double& owner_H(int lane, int component) noexcept { return at(Hbar_, lane, component); }
@@ -54,6 +59,7 @@ class TangentBatch {
   int evaluate_laminates(int first, int n, const double* H);
   void remove_negative_curvature(int lane);
 
+  LawsOfSpace of_;
   const MaterialPoints& points_;
   const Laws& laws_;
   bool selective_;

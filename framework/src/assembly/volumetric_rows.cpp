@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "assembly/volumetric_state.hpp"
-#include "cloud_balance/shift.hpp"
 #include "core/dimension.hpp"
 #include "perikit/core/field_operations.hpp"
 
@@ -35,7 +34,7 @@ class StoredRows final : public VolumetricState<D> {
   }
 
   std::int64_t linearise(ConstFieldView u) override {
-    this->memory_.prepare([] { return std::make_unique<Memory>(); });
+    this->memory_.prepare([&] { return std::make_unique<Memory>(this->parts_); });
     FirstBad bad;
     this->over_rows(roles_.felt, [&](std::size_t i) {
       if (!make_row(i, u, this->memory_.mine())) bad.report(static_cast<std::int64_t>(rows_.point(i)));
@@ -89,18 +88,17 @@ class StoredRows final : public VolumetricState<D> {
 
   /// b_ij = Fbar_i^-T g_ij; false where Jbar_i <= 0.
   bool make_row(std::size_t i, ConstFieldView u, Memory& m) {
-    rows_.load(i, m.family);
-    point_gradient(m.family, rows_.body().horizon(), this->parts_.formulation.order, m.g);
-    if (this->parts_.shift.data) shift_gradient(m.family, this->parts_.shift, m.g);
     const std::size_t p = rows_.point(i), first = rows_.first(i);
+    m.points.read(p);
+    const double* const g = m.points.own();
     const auto neighbours = rows_.neighbours(i);
     T H{};
     bool regular = false;
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       const std::size_t q = rows_.point(static_cast<std::size_t>(neighbours[k]));
       for (int c = 0; c < D; ++c)
-        for (int e = 0; e < D; ++e) H(c, e) += (u.component(c)[q] - u.component(c)[p]) * m.g[k * D + static_cast<std::size_t>(e)];
-      for (std::size_t e = 0; e < D; ++e) regular |= m.g[k * D + e] != 0;
+        for (int e = 0; e < D; ++e) H(c, e) += (u.component(c)[q] - u.component(c)[p]) * g[k * D + static_cast<std::size_t>(e)];
+      for (std::size_t e = 0; e < D; ++e) regular |= g[k * D + e] != 0;
     }
     const std::optional<T> inverse_transpose = this->keep(p, H, regular ? this->parts_.families.remaining_influence(p) : 0.0);
     if (!inverse_transpose) return false;
@@ -109,7 +107,7 @@ class StoredRows final : public VolumetricState<D> {
       Entry entry{};
       for (int c = 0; c < D; ++c) {
         double b = 0;
-        for (int e = 0; e < D; ++e) b += (*inverse_transpose)(c, e) * m.g[k * D + static_cast<std::size_t>(e)];
+        for (int e = 0; e < D; ++e) b += (*inverse_transpose)(c, e) * g[k * D + static_cast<std::size_t>(e)];
         entry[c] = static_cast<float>(b);
       }
       row_[first + k] = entry;

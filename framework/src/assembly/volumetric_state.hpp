@@ -11,6 +11,7 @@
 #include "assembly/volumetric_rows.hpp"
 #include "operators/volume_stiffness.hpp"
 #include "perikit/core/tensor.hpp"
+#include "spaces/evaluation_points.hpp"
 
 namespace perikit {
 
@@ -26,8 +27,8 @@ class VolumetricState : public VolumetricRows {
 
   /// Memory of a thread.
   struct Memory {
-    FamilyArrays family;
-    std::vector<double> g;
+    explicit Memory(const SpaceParts& parts) : points(parts) {}
+    EvaluationPoints<D> points;
     LawScratch law;
     alignas(64) double H[9 * batch_points] = {}, F[9 * batch_points] = {}, P[9 * batch_points], dP[9 * batch_points];
     std::int32_t owner[batch_points];

@@ -215,10 +215,6 @@ void BatchWork::leave_out_incomplete(int n, BatchScratch& s) const noexcept {
 
 int BatchWork::evaluate(int n, BatchScratch& s, bool both_ends, GroupEnergy* energy) const noexcept {
   s.stress_weight = nullptr;
-  if (finder_) {
-    finder_->add(n, selective_ ? s.Ht : s.H, s);
-    return -1;
-  }
   if (balance_) return balance_pass(n, s, both_ends);
   if (both_ends && s.one_law < 0 && laws_.has_incomplete_points()) leave_out_incomplete(n, s);
   if (screen_) std::fill(std::begin(s.highest), std::end(s.highest), 0.0);
@@ -262,7 +258,6 @@ int BatchWork::evaluate_plain(int n, BatchScratch& s, bool both_ends, GroupEnerg
 }
 
 void Pass::add_samples(int n, const BatchScratch& s, bool both_ends) {
-  if (work.finds()) return;
   if (bonds)
     bonds->add(n, s, work.selective());
   else

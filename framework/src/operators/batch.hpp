@@ -117,7 +117,6 @@ struct BatchTask {
   const Balance* balance = nullptr;      ///< in place of laws
   BondScreen* screen = nullptr;          ///< where bonds that may hold too much are marked
   const Laminates* laminates = nullptr;
-  LaminateFinder* finder = nullptr;      ///< gradients are collected, and no law is evaluated
 };
 
 class BatchWork {
@@ -132,8 +131,7 @@ class BatchWork {
         ends_step_(task.ends_step),
         balance_(task.balance),
         screen_(task.screen),
-        laminates_(task.laminates),
-        finder_(task.finder) {}
+        laminates_(task.laminates) {}
 
   /// With Work::sample: stresses of the selective map become derivatives by the gradients that came in, W times; with pressures.
   void pull_back() noexcept { pulled_back_ = true; }
@@ -165,12 +163,11 @@ class BatchWork {
   /// evaluation points with factors these; null: 1.
   void screen_bonds(int n, int far_end, const BatchScratch& s, const double* factor = nullptr, const double* far_factor = nullptr) const;
   /// Whether the numbers of lanes are asked for.
-  bool numbered() const noexcept { return points_ || laminates_ || finder_; }
+  bool numbered() const noexcept { return points_ || laminates_; }
   /// Some evaluation points are laminates.
   bool laminates() const noexcept { return laminates_ != nullptr; }
   /// These eight points may own laminates.
   bool laminates_near(std::int32_t first) const noexcept { return laminates_ && laminates_->near(first); }
-  bool finds() const noexcept { return finder_ != nullptr; }
   /// What is done in place of laws; null: laws are.
   const Balance* balance() const noexcept { return balance_; }
 
@@ -244,7 +241,6 @@ class BatchWork {
   const Balance* balance_;
   BondScreen* screen_;
   const Laminates* laminates_;
-  LaminateFinder* finder_;
   const SampleSums* along_ = nullptr;
 };
 

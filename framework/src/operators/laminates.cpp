@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "operators/batch.hpp"
-#include "perikit/core/parallel.hpp"
-
 namespace perikit {
 
 double interface_value(const Interfaces& interfaces, std::size_t interface, std::size_t point, InterfaceValue what) noexcept {
@@ -43,37 +40,6 @@ bool find_laminate(int dimension, const double (&gradient)[interface_values][3],
   if (!sees(dimension, of(InterfaceValue::plus)) || !sees(dimension, of(InterfaceValue::minus))) return false;
   if (sees(dimension, of(InterfaceValue::others))) return false;
   return make_laminate(dimension, of(InterfaceValue::plus), of(InterfaceValue::minus), out);
-}
-
-LaminateFinder::LaminateFinder(int dimension, bool once_for_both, int keep, bool with_weightless)
-    : dimension_(dimension), keep_(keep), once_(once_for_both), with_weightless_(with_weightless), of_thread_(static_cast<std::size_t>(thread_count())) {}
-
-void LaminateFinder::add(int n, const double* H, const BatchScratch& s) {
-  std::vector<Found>& found = of_thread_[static_cast<std::size_t>(thread_index())];
-  for (int l = 0; l < n; ++l) {
-    std::int64_t number = s.first_number >= 0 ? s.first_number + l : s.number[l];
-    // Numbers of bonds that are evaluated once come from one of their ends, whatever the order of threads.
-    // Most lanes without a weight are there to fill a batch.
-    if (number < 0 || (s.weight[l] == 0 && !with_weightless_) || (once_ && s.owner[l] >= s.far[l])) continue;
-    if (s.far_number > 0 && number >= s.far_number) number -= s.far_number;
-    Found entry{number, s.owner[l], s.far[l], s.far_number > 0 ? number + s.far_number : -1, {}};
-    bool kept = true;
-    for (int c = 0; c < dimension_; ++c) {
-      for (int e = 0; e < dimension_; ++e) entry.gradient[c][e] = H[(c * dimension_ + e) * batch_points + l];
-      kept = kept && (c >= keep_ || sees(dimension_, entry.gradient[c]));
-    }
-    if (kept) found.push_back(entry);
-  }
-}
-
-std::vector<LaminateFinder::Found> LaminateFinder::take() {
-  std::vector<Found> all;
-  for (std::vector<Found>& found : of_thread_) {
-    all.insert(all.end(), found.begin(), found.end());
-    found.clear();
-  }
-  std::ranges::sort(all, {}, &Found::number);
-  return all;
 }
 
 Laminates::Laminates(std::shared_ptr<const Interfaces> interfaces, std::size_t points, std::size_t numbers)

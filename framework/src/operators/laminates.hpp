@@ -1,6 +1,5 @@
 #pragma once
-/// Which evaluation points of a space are laminates, by their stable numbers. Found by passes of the space over the distances of
-/// points from interfaces in place of displacements, so that what is found belongs to the stencils as they are.
+/// Which evaluation points of a space are laminates, by their stable numbers (spaces/find_laminates.hpp).
 
 #include <cstdint>
 #include <memory>
@@ -13,8 +12,6 @@
 
 namespace perikit {
 
-struct BatchScratch;
-
 /// Values at the points of one interface whose gradients tell what an evaluation point sees of it: the positive and the negative
 /// part of the distance, and something that is not zero at points of other materials.
 enum class InterfaceValue { plus, minus, others };
@@ -26,50 +23,6 @@ bool sees(int dimension, const double* gradient) noexcept;
 bool find_laminate(int dimension, const double (&gradient)[interface_values][3], LaminatePoint& out) noexcept;
 /// Its points: of an evaluation point with this owner.
 void set_points(const Interfaces& interfaces, std::size_t interface, std::int32_t owner, LaminatePoint& out) noexcept;
-
-/// By the stencil of an evaluation point: gradient(value, g) writes the gradient of value(p), p points of the body.
-template <class Gradient>
-bool laminate_by_stencil(int dimension, const Interfaces& interfaces, std::int32_t owner, Gradient&& gradient,
-                         LaminatePoint& out) {
-  for (std::size_t k = 0; k < interfaces.all.size(); ++k) {
-    if (interfaces.all[k].find(owner) < 0) continue;
-    double g[interface_values][3] = {};
-    bool seen = true;
-    for (int v = 0; v < interface_values && seen; ++v) {
-      const auto what = static_cast<InterfaceValue>(v);
-      gradient([&](std::size_t p) { return interface_value(interfaces, k, p, what); }, g[v]);
-      seen = what == InterfaceValue::others || sees(dimension, g[v]);
-    }
-    if (!seen || !find_laminate(dimension, g, out)) continue;
-    set_points(interfaces, k, owner, out);
-    return true;
-  }
-  return false;
-}
-
-/// Gradients that passes of a space leave behind, by number.
-class LaminateFinder {
- public:
-  struct Found {
-    std::int64_t number;
-    std::int32_t owner, far;    ///< far: of bonds; else -1
-    std::int64_t other_number;  ///< of the state that the other end has for itself; -1: none
-    double gradient[3][3];      ///< by component of the displacement
-  };
-
-  /// once_for_both: bonds have the number of the end with the smaller index. keep: of these components all gradients must be
-  /// there. with_weightless: evaluation points that have no weight at present are found, too.
-  LaminateFinder(int dimension, bool once_for_both, int keep, bool with_weightless = false);
-  /// H: before the selective map.
-  void add(int n, const double* H, const BatchScratch& s);
-  /// In ascending order of numbers.
-  std::vector<Found> take();
-
- private:
-  int dimension_, keep_;
-  bool once_, with_weightless_;
-  std::vector<std::vector<Found>> of_thread_;
-};
 
 class Laminates {
  public:

@@ -19,6 +19,12 @@
 
 namespace perikit {
 
+/// Where what belongs to an evaluation point is kept; -1: nowhere.
+struct PointNumbers {
+  std::int64_t point = -1;  ///< of the evaluation point: the same from both ends of a bond that is evaluated once
+  std::int64_t state = -1;  ///< of what the law of this end remembers of it
+};
+
 class EvaluationSpace {
  public:
   virtual ~EvaluationSpace() = default;
@@ -32,8 +38,11 @@ class EvaluationSpace {
   virtual void complete(GroupMarks& marks) const { mark_whole_runs(1, marks); }
   /// The numbers of evaluation points lie below this.
   virtual std::size_t numbers() const noexcept = 0;
-  /// Which of several evaluation points of its owner has this number, where they are parts of its family.
-  virtual std::int64_t which(std::int64_t) const noexcept { return 0; }
+  /// Numbers of an evaluation point of p: of its bond to `far`, or else (far = -1) of that part of its family. Only where numbers are asked for
+  /// (SpaceParts::numbered).
+  virtual PointNumbers number_of(std::int32_t p, std::int32_t far, int part) const noexcept = 0;
+  /// This rank evaluates what belongs to p.
+  virtual bool evaluates(std::size_t) const noexcept { return true; }
   /// What follows from the bonds of these points is to be made anew.
   virtual void bonds_changed(std::span<const std::int32_t> points) = 0;
   /// Weights of evaluation points may be multiplied by factors, of which there are so many; 0: they may not. Bonds of a cloud: by
@@ -70,6 +79,8 @@ struct SpaceParts {
   bool history() const noexcept { return laws.state_components() > 0; }
   /// Evaluation points need numbers.
   bool numbered() const noexcept { return history() || interfaces; }
+  /// A bond has one evaluation point for both ends.
+  bool bonds_once() const noexcept { return formulation.pair_symmetric && share; }
   RestingBlocks quiet_blocks(const BlockReach& reach) const { return skip ? RestingBlocks(reach, history()) : RestingBlocks(); }
 };
 

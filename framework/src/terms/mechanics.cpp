@@ -7,6 +7,9 @@
 #include "assembly/bond_assembly.hpp"
 #include "assembly/element_assembly.hpp"
 #include "core/dimension.hpp"
+#include "core/per_thread.hpp"
+#include "spaces/evaluation_points.hpp"
+#include "spaces/find_laminates.hpp"
 
 namespace perikit {
 
@@ -48,106 +51,60 @@ void Mechanics::bonds_changed(std::span<const std::int32_t> points) {
   find_laminates(std::move(marks), true);
 }
 
-/// Of the rows of these displacements, where those of the first `keep` components are not zero.
-std::vector<LaminateFinder::Found> Mechanics::gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near,
-                                                        bool with_weightless) {
-  LaminateFinder finder(parts_.families.body().dimension(), parts_.formulation.pair_symmetric && parts_.share, keep, with_weightless);
-  const BatchWork work(parts_.laws, {.work = Work::sample, .selective = parts_.formulation.selective(), .finder = &finder});
-  Pass pass{work, values, {}, {}, nullptr, nullptr, -1, {}, marks.data(), near.data()};
-  space_->run(pass);
-  return finder.take();
+std::vector<HistoryPlace> Mechanics::history_points() {
+  return with_dimension(parts_.families.body().dimension(), [&](auto d) { return history_points<d>(); });
 }
 
+template <int D>
 std::vector<HistoryPlace> Mechanics::history_points() {
-  constexpr std::size_t at_once = 1024;  // groups, so that what is found of them takes little memory
   const Body& body = parts_.families.body();
-  const Field values = body.make_field(body.dimension());
-  const auto place = [&](std::int32_t p) -> std::int64_t {
-    return !body.part() || p < 0 ? p : body.places().place[static_cast<std::size_t>(p)];
-  };
-  // Those of points and of parts of families have no far end.
-  const bool of_bonds = parts_.formulation.bond || (parts_.formulation.weighted && parts_.formulation.parts(body.dimension()) == 0);
-  // Of bonds between unlike laws alone, and never of those that store nothing here: a body of one law has other laws on ranks, of their ghosts, and yet
-  // the same evaluation points.
-  const auto two_states = [&](const LaminateFinder::Found& found) {
-    const auto owner = static_cast<std::size_t>(found.owner), far = static_cast<std::size_t>(found.far);
-    if (parts_.formulation.selective()) return true;
-    return !parts_.laws.same(owner, far) && !(parts_.laws.has_incomplete_points() && (parts_.laws.incomplete(owner) || parts_.laws.incomplete(far)));
-  };
-  std::vector<HistoryPlace> points;
-  const std::size_t groups = body.stride() / padding;
-  for (std::size_t first = 0; first < groups; first += at_once) {
-    GroupMarks marks(groups, 0);
-    std::fill_n(marks.begin() + static_cast<std::ptrdiff_t>(first), std::min(at_once, groups - first), whole_group);
-    const GroupMarks near = parts_.families.around(marks);
-    // Parts of families that have become too poor for a gradient have no weight, until so many bonds have failed that one of them is all
-    // that its point has. Their history goes on meanwhile.
-    for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near, !of_bonds && parts_.formulation.weighted != nullptr)) {
-      const bool own = body.owns(static_cast<std::size_t>(found.owner));
-      const HistoryPoint point{place(found.owner), of_bonds ? place(found.far) : -1,
-                               of_bonds ? std::int64_t{0} : space_->which(found.number)};
-      points.push_back({point, found.number, own});
-      if (found.other_number >= 0 && two_states(found)) points.push_back({{point.owner, point.far, point.which + 1}, found.other_number, own});
+  const auto place = [&](std::int32_t p) -> std::int64_t { return body.part() ? body.places().place[static_cast<std::size_t>(p)] : p; };
+  PerThread<EvaluationPoints<D>> readers;
+  readers.prepare([&] { return std::make_unique<EvaluationPoints<D>>(parts_); });
+  const auto add_points = [&](std::int32_t p, std::vector<HistoryPlace>& to) {
+    const auto at = static_cast<std::size_t>(p);
+    if (!space_->evaluates(at)) return;
+    EvaluationPoints<D>& points = readers.mine();
+    const bool own = body.owns(at), of_bonds = points.at_bonds();
+    if (of_bonds) points.read(at);
+    for (int q = 0; q < points.points(); ++q) {
+      const std::int32_t far = of_bonds ? points.family().far[static_cast<std::size_t>(q)] : -1;
+      // Parts of families that have become too poor for a gradient have no weight, until so many bonds have failed that one of them is all
+      // that its point has. Their history goes on meanwhile.
+      if (of_bonds && (points.weight(q) == 0 || (parts_.bonds_once() && far < p))) continue;
+      const std::int64_t state = space_->number_of(p, far, q).state;
+      if (state < 0) continue;
+      to.push_back({{place(p), of_bonds ? place(far) : -1, of_bonds ? 0 : q}, state, own});
+      // Two states of bonds between unlike laws alone, and never of those that store nothing here: a body of one law has other laws on ranks, of
+      // their ghosts, and yet the same evaluation points.
+      const auto incomplete = [&](std::int32_t end) { return parts_.laws.has_incomplete_points() && parts_.laws.incomplete(static_cast<std::size_t>(end)); };
+      if (!of_bonds || !parts_.bonds_once() || (!parts_.formulation.selective() && (incomplete(p) || incomplete(far)))) continue;
+      if (const std::int64_t of_far = space_->number_of(far, p, 0).state; of_far != state) to.push_back({{place(p), place(far), 1}, of_far, own});
     }
+  };
+  std::vector<HistoryPlace> all;
+  constexpr std::size_t at_once = 8192;   // points, so that what is found of them takes little memory
+  std::vector<std::vector<HistoryPlace>> found(at_once);
+  const std::span<const std::int32_t> points = body.internal();
+  for (std::size_t first = 0; first < points.size(); first += at_once) {
+    const std::size_t count = std::min(at_once, points.size() - first);
+    parallel_for(count, [&](std::size_t k) {
+      found[k].clear();
+      add_points(points[first + k], found[k]);
+    });
+    for (std::size_t k = 0; k < count; ++k) all.insert(all.end(), found[k].begin(), found[k].end());
   }
-  std::ranges::sort(points, {}, &HistoryPlace::point);
-  return points;
+  std::ranges::sort(all, {}, &HistoryPlace::point);
+  return all;
 }
 
 void Mechanics::find_laminates(GroupMarks marks, bool again) {
-  const Body& body = parts_.families.body();
-  const Interfaces& interfaces = laminates_->interfaces();
-  const int d = body.dimension();
-  bool any = false;
-  for (std::size_t g = 0; g < marks.size(); ++g) {
-    marks[g] &= laminates_->near()[g];
-    any |= marks[g] != 0;
-  }
-  if (!any) return;
-  const GroupMarks near = parts_.families.around(marks);
-  Field values = body.make_field(d);
-  if (again)
-    for (const LaminateFinder::Found& found : gradients_of(values, 0, marks, near)) laminates_->clear(found.number);
-  // The gradients of the three values, as many of them at once as there are components.
-  for (std::size_t k = 0; k < interfaces.all.size(); ++k) {
-    std::vector<LaminateFinder::Found> of_value[interface_values];
-    for (int first = 0; first < interface_values; first += d) {
-      const int count = std::min(d, interface_values - first);
-      for (int c = 0; c < d; ++c) {
-        double* const to = values.component(c);
-        std::fill_n(to, body.stride(), 0.0);
-        for (const std::int32_t index : body.internal())
-          if (const auto p = static_cast<std::size_t>(index); c < count) to[p] = interface_value(interfaces, k, p, static_cast<InterfaceValue>(first + c));
-      }
-      // Both parts of the distance, where they come together.
-      const std::vector<LaminateFinder::Found> found = gradients_of(values, first == 0 ? std::min(count, 2) : 1, marks, near);
-      for (int c = 0; c < count; ++c) {
-        std::vector<LaminateFinder::Found>& to = of_value[first + c];
-        to = found;
-        for (LaminateFinder::Found& entry : to) std::copy_n(entry.gradient[c], 3, entry.gradient[0]);
-      }
-    }
-    const auto other = [&](InterfaceValue what, std::int64_t number) -> const double* {
-      const auto& all = of_value[static_cast<int>(what)];
-      const auto at = std::ranges::lower_bound(all, number, {}, &LaminateFinder::Found::number);
-      return at != all.end() && at->number == number ? at->gradient[0] : nullptr;
-    };
-    for (const LaminateFinder::Found& found : of_value[0]) {
-      const double* const minus = other(InterfaceValue::minus, found.number);
-      if (!minus || !sees(d, minus)) continue;
-      double gradient[interface_values][3] = {};
-      std::copy_n(found.gradient[0], 3, gradient[0]);
-      std::copy_n(minus, 3, gradient[1]);
-      if (const double* others = other(InterfaceValue::others, found.number)) std::copy_n(others, 3, gradient[2]);
-      LaminatePoint point;
-      if (!find_laminate(d, gradient, point)) {
-        laminates_->kept_parallel += !again;
-        continue;
-      }
-      set_points(interfaces, k, found.owner, point);
-      laminates_->set(found.number, point);
-    }
-  }
+  for (std::size_t g = 0; g < marks.size(); ++g) marks[g] &= laminates_->near()[g];
+  if (std::ranges::all_of(marks, [](std::uint8_t group) { return group == 0; })) return;
+  const std::size_t parallel = with_dimension(parts_.families.body().dimension(), [&](auto d) {
+    return perikit::find_laminates<d>(parts_, *space_, marks, *laminates_);
+  });
+  if (!again) laminates_->kept_parallel += parallel;
 }
 
 std::int64_t Mechanics::add_forces(const Configuration& at, const Region& region, const ForceSum& sum, const SampleSums* samples) {
@@ -241,34 +198,11 @@ int Mechanics::coupling_reach() const noexcept {
 }
 
 std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) {
-  const RememberedPoints remembered{*points_, [this](const BlockRows& of) { return numbers_by_row(of); }};
+  const LawsOfSpace laws{*points_, *space_, laminates_.get()};
   return with_dimension(parts_.families.body().dimension(), [&](auto d) -> std::unique_ptr<Assembly> {
-    if (parts_.formulation.bond) return std::make_unique<BondAssembly<d>>(parts_, remembered, rows);
-    return std::make_unique<ElementAssembly<d>>(parts_, remembered, rows);
+    if (parts_.formulation.bond) return std::make_unique<BondAssembly<d>>(parts_, laws, rows);
+    return std::make_unique<ElementAssembly<d>>(parts_, laws, rows);
   });
-}
-
-std::vector<std::int64_t> Mechanics::numbers_by_row(const BlockRows& rows) {
-  const std::vector<HistoryPlace> known = history_points();   // assembled tangents have the whole body: places are indices
-  const auto number_of = [&](const HistoryPoint& point) {
-    const auto at = std::ranges::lower_bound(known, point, {}, &HistoryPlace::point);
-    return at != known.end() && at->point == point ? at->number : std::int64_t{-1};
-  };
-  const auto parts = static_cast<std::size_t>(parts_.formulation.parts(rows.body().dimension()));
-  std::vector<std::int64_t> numbers;
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    const auto p = static_cast<std::int64_t>(rows.point(r));
-    for (std::size_t w = 0; w < parts; ++w) numbers.push_back(number_of({p, -1, static_cast<std::int64_t>(w)}));
-    if (parts > 0) continue;
-    for (const std::int32_t neighbour : rows.neighbours(r)) {
-      // A bond that is evaluated once for both ends has one state, or a second one for the end that does not have its number.
-      const auto q = static_cast<std::int64_t>(rows.point(static_cast<std::size_t>(neighbour)));
-      std::int64_t number = number_of({p, q, 0});
-      if (number < 0) number = number_of({q, p, 1});
-      numbers.push_back(number >= 0 ? number : number_of({q, p, 0}));
-    }
-  }
-  return numbers;
 }
 
 std::int64_t Mechanics::stiffness_near_laminates(ConstFieldView u, FieldView stiffness) {

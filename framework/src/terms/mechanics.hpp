@@ -44,16 +44,14 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   /// samples: taken along; null: none.
   std::int64_t add_forces(const Configuration& at, const Region& region, const ForceSum& sum, const SampleSums* samples);
   BatchWork work(const Configuration& at, BatchTask task) const noexcept;
-  /// Looks for laminates among the evaluation points of the groups marked. again: there may have been others.
+  /// Looks for laminates among the evaluation points of the points marked. again: there may have been others.
   void find_laminates(GroupMarks marks, bool again);
+  template <int D>
+  std::vector<HistoryPlace> history_points();
   class LaminateVolumes;
-  /// See RememberedPoints.
-  std::vector<std::int64_t> numbers_by_row(const BlockRows& rows);
   /// stiffness <- that of the volumes of points whose evaluation points may be laminates (VolumetricRows), where it is not 0. Field index of
   /// an inadmissible point, or -1.
   std::int64_t stiffness_near_laminates(ConstFieldView u, FieldView stiffness);
-  std::vector<LaminateFinder::Found> gradients_of(const Field& values, int keep, const GroupMarks& marks, const GroupMarks& near,
-                                                 bool with_weightless = false);
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;

@@ -450,17 +450,9 @@ void CloudBonds<D>::number_bonds() {
 
 template <int D>
 void CloudBonds<D>::number(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept {
-  s.far_number = static_cast<std::int64_t>(two_states_ ? one_end_ : 0);
-  s.first_number = begin >= first_bond(p) ? number_[p] + begin - first_bond(p) : -1;
-  for (int l = 0; l < lanes && s.first_number < 0; ++l) {
-    const auto j = static_cast<std::size_t>(s.far[l]);
-    if (begin + l >= first_bond(p)) {
-      s.number[l] = l < n ? number_[p] + begin + l - first_bond(p) : -1;
-    } else {
-      const bool same = !two_states_ || (!selective_ && laws_.same(p, j));
-      s.number[l] = number_[j] + families_.index(s.far[l], static_cast<std::int32_t>(p)) - upper_[j] + (same ? 0 : s.far_number);
-    }
-  }
+  s.far_number = far_number();
+  s.first_number = begin >= first_bond(p) ? state_number(p, begin, p) : -1;
+  for (int l = 0; l < lanes && s.first_number < 0; ++l) s.number[l] = l < n ? state_number(p, begin + l, static_cast<std::size_t>(s.far[l])) : -1;
 }
 
 template <int D>

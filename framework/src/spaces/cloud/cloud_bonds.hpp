@@ -18,6 +18,10 @@ class CloudBonds final : public EvaluationSpace {
 
   void run(Pass& pass) override;
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end_; }
+  PointNumbers number_of(std::int32_t p, std::int32_t far, int) const noexcept override {
+    const std::int64_t state = state_number(static_cast<std::size_t>(p), families_.index(p, far), static_cast<std::size_t>(far));
+    return {state >= far_number() && two_states_ ? state - far_number() : state, state};
+  }
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override { return families_.lists().neighbour.size(); }
   void set_factors(std::span<const double> factors) override;
@@ -40,6 +44,13 @@ class CloudBonds final : public EvaluationSpace {
                       const AlignedVector<Row>& H, double* out) const noexcept;
   void scatter(std::size_t p, int n, const BatchScratch& s, bool both_ends, bool tangent) noexcept;
   void number(std::size_t p, std::int64_t begin, int n, int lanes, BatchScratch& s) const noexcept;
+  /// Of the bond at this place of the lists, which leads from p to j.
+  std::int64_t state_number(std::size_t p, std::int64_t bond, std::size_t j) const noexcept {
+    if (bond >= first_bond(p)) return number_[p] + bond - first_bond(p);
+    const bool same = !two_states_ || (!selective_ && laws_.same(p, j));
+    return number_[j] + families_.index(static_cast<std::int32_t>(j), static_cast<std::int32_t>(p)) - upper_[j] + (same ? 0 : far_number());
+  }
+  std::int64_t far_number() const noexcept { return two_states_ ? static_cast<std::int64_t>(one_end_) : 0; }
   void number_bonds();
   // Selective map: volume changes of the points of a block; its stress on their gradients, from the pressures.
   void volumes(std::size_t b, const Pass& pass) noexcept;

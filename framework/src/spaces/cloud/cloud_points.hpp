@@ -15,6 +15,7 @@ class CloudPoints final : public EvaluationSpace {
   void run(Pass& pass) override;
   void complete(GroupMarks& marks) const override { mark_whole_runs(batch_points / padding, marks); }
   std::size_t numbers() const noexcept override { return padded(points_); }
+  PointNumbers number_of(std::int32_t p, std::int32_t, int) const noexcept override { return {p, p}; }
   void bonds_changed(std::span<const std::int32_t> points) override;
   void shift_gradients(ConstFieldView lambda) override;
   void report(ModelReport& report) const override;

@@ -137,27 +137,26 @@ void LatticeBonds<D>::add_pressures(const LatticeChunk& chunk, std::size_t slot,
   }
 }
 
-/// Stable numbers: of bonds that are evaluated once, those of their slot in the first half. whole: this batch has the slots that are
-/// numbered, one after the other.
+/// Stable numbers: of bonds that are evaluated once, those of their slot in the first half; of point l of a chunk. -1: a bond of the second half that
+/// is not there.
+template <int D>
+std::int64_t LatticeBonds<D>::state_number(std::size_t index, std::size_t slot, int l) const noexcept {
+  const auto of = [&](std::size_t chunk, std::size_t at) { return static_cast<std::int64_t>((chunk * slots_each() + at) * chunk_points); };
+  if (slot < slots_each()) return of(index, slot) + l;
+  const LatticeChunk& chunk = tiles_.chunks[index];
+  if (!families_.pattern(chunk).intact(slot, l)) return -1;
+  const std::int64_t far = chunk.first + l + families_.slots.shifts[slot];
+  const bool same = !two_states_ || (!selective_ && laws_.same(static_cast<std::size_t>(chunk.first + l), static_cast<std::size_t>(far)));
+  return of(static_cast<std::size_t>(tiles_.chunk_of(far)), families_.slots.reverse(slot)) + far % chunk_points + (same ? 0 : far_number());
+}
+
+/// whole: this batch has the slots that are numbered, one after the other.
 template <int D>
 void LatticeBonds<D>::number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept {
-  const auto of = [&](std::size_t chunk, std::size_t at) { return static_cast<std::int64_t>((chunk * slots_each() + at) * chunk_points); };
-  s.far_number = static_cast<std::int64_t>(two_states_ ? one_end() : 0);
-  s.first_number = whole ? of(index, slot) : -1;
-  const LatticePattern& pattern = families_.pattern(tiles_.chunks[index]);
-  for (int lane = 0; lane < slots * chunk_points && !whole; ++lane) {
-    const std::size_t at = slot + static_cast<std::size_t>(lane / chunk_points);
-    const int l = lane % chunk_points;
-    if (at < slots_each()) {
-      s.number[lane] = of(index, at) + l;
-    } else if (!pattern.intact(at, l)) {
-      s.number[lane] = -1;
-    } else {
-      const std::int64_t far = tiles_.chunks[index].first + l + families_.slots.shifts[at];
-      const bool same = !two_states_ || (!selective_ && laws_.same(static_cast<std::size_t>(tiles_.chunks[index].first + l), static_cast<std::size_t>(far)));
-      s.number[lane] = of(static_cast<std::size_t>(tiles_.chunk_of(far)), families_.slots.reverse(at)) + far % chunk_points + (same ? 0 : s.far_number);
-    }
-  }
+  s.far_number = far_number();
+  s.first_number = whole ? state_number(index, slot, 0) : -1;
+  for (int lane = 0; lane < slots * chunk_points && !whole; ++lane)
+    s.number[lane] = state_number(index, slot + static_cast<std::size_t>(lane / chunk_points), lane % chunk_points);
 }
 
 template <int D>

@@ -22,6 +22,13 @@ class LatticeBonds final : public EvaluationSpace {
 
   void run(Pass& pass) override;
   std::size_t numbers() const noexcept override { return (two_states_ ? 2 : 1) * one_end(); }
+  PointNumbers number_of(std::int32_t p, std::int32_t far, int) const noexcept override {
+    const std::int64_t state = state_number(static_cast<std::size_t>(tiles_.chunk_of(p)), families_.slots.with_shift(far - p), p % chunk_points);
+    return {state >= far_number() && two_states_ ? state - far_number() : state, state};
+  }
+  bool evaluates(std::size_t p) const noexcept override {
+    return roles_.wants(static_cast<std::size_t>(tiles_.chunk_of(static_cast<std::int64_t>(p))), &ChunkRole::bonds);
+  }
   void bonds_changed(std::span<const std::int32_t> points) override;
   PointFlux point_flux() const noexcept override {
     if (last_ == Last::other || stencils_) return {};
@@ -42,6 +49,7 @@ class LatticeBonds final : public EvaluationSpace {
   void bonds(std::size_t b, Pass& pass);
   int bonds_of_chunk(std::size_t index, std::size_t slot, int slots, BatchScratch& s, Pass& pass, GroupEnergy* energy, std::vector<OneSidedStress>& later);
   void number(std::size_t index, std::size_t slot, int slots, bool whole, BatchScratch& s) const noexcept;
+  std::int64_t state_number(std::size_t index, std::size_t slot, int l) const noexcept;
   void bond_vectors(const LatticeChunk& chunk, std::size_t slot, int slots, BatchScratch& s, BondVectors& vectors) const;
   void set_whole_vectors();
   void store_corrections();
@@ -65,6 +73,7 @@ class LatticeBonds final : public EvaluationSpace {
   double share_of_volume(std::size_t p) const noexcept;
 
   std::size_t slots_each() const noexcept { return pairs_ ? families_.slots.half : families_.slots.size(); }
+  std::int64_t far_number() const noexcept { return two_states_ ? static_cast<std::int64_t>(one_end()) : 0; }
   std::size_t one_end() const noexcept { return tiles_.chunks.size() * slots_each() * chunk_points; }
 
   const LatticeFamilies& families_;

@@ -19,6 +19,10 @@ class LatticePoints final : public EvaluationSpace {
   bool moves_points() const noexcept override { return true; }
   void complete(GroupMarks& marks) const override { tiles_.complete(marks); }
   std::size_t numbers() const noexcept override { return tiles_.chunks.size() * chunk_points; }
+  PointNumbers number_of(std::int32_t p, std::int32_t, int) const noexcept override {
+    const std::int64_t number = std::int64_t{tiles_.chunk_of(p)} * chunk_points + p % chunk_points;
+    return {number, number};
+  }
   void bonds_changed(std::span<const std::int32_t>) override {}   // patterns are read where they are needed
   void report(ModelReport& report) const override;
 

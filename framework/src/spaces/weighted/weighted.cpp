@@ -84,19 +84,20 @@ std::int32_t Weighted<D>::single(std::size_t g, Memory& m, BatchScratch& s, Pass
   return evaluate_family(p, number_of(g), m, s, pass, energy);
 }
 
+template <int D>
+std::int32_t Weighted<D>::bond_at_set_up(std::int32_t p, std::int32_t far, const Group& g) const noexcept {
+  if (cloud_) return static_cast<std::int32_t>(cloud_->index(p, far) - cloud_->lists().first[static_cast<std::size_t>(p)]);
+  const std::vector<std::int32_t>& shifts = classes_[static_cast<std::size_t>(g.family)].shifts;
+  return static_cast<std::int32_t>(std::find(shifts.begin(), shifts.end(), far - p) - shifts.begin());
+}
+
 /// A point that has left its group keeps the numbers of its evaluation points.
 template <int D>
-void Weighted<D>::find_numbers(std::int32_t p, const Group& g, Memory& m) const {
-  m.original.clear();
-  for (const std::int32_t far : m.family.far) {
-    if (parts_ > 0) continue;
-    if (cloud_) {
-      m.original.push_back(static_cast<std::int32_t>(cloud_->index(p, far) - cloud_->lists().first[static_cast<std::size_t>(p)]));
-    } else {
-      const std::vector<std::int32_t>& shifts = classes_[static_cast<std::size_t>(g.family)].shifts;
-      m.original.push_back(static_cast<std::int32_t>(std::find(shifts.begin(), shifts.end(), far - p) - shifts.begin()));
-    }
-  }
+PointNumbers Weighted<D>::number_of(std::int32_t p, std::int32_t far, int part) const noexcept {
+  const Place& place = place_[static_cast<std::size_t>(p)];
+  if (groups_.empty() || members_[groups_[place.group].first + place.lane] != p) return {};   // a point without bonds
+  const std::int64_t number = number_of(place.group) + place.lane + 8 * (parts_ > 0 ? part : bond_at_set_up(p, far, groups_[place.group]));
+  return {number, number};
 }
 
 template <int D>
@@ -118,10 +119,9 @@ std::int32_t Weighted<D>::evaluate_detached_point(std::int32_t p, Memory& m, Bat
   }
   load_family(static_cast<std::size_t>(p), BondsOf::intact, m);
   if (m.family.far.empty()) return -1;
-  if (pass.work.numbered() || factor_)
-    find_numbers(p, groups_[place.group], m);
-  else
-    m.original.clear();
+  m.original.clear();
+  if ((pass.work.numbered() || factor_) && parts_ == 0)
+    for (const std::int32_t far : m.family.far) m.original.push_back(bond_at_set_up(p, far, groups_[place.group]));
   return evaluate_family(p, number_of(place.group) + place.lane, m, s, pass, energy);
 }
 

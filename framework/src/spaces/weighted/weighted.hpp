@@ -33,7 +33,7 @@ class Weighted final : public EvaluationSpace {
     else mark_whole_runs(body_.block_points() / padding, marks);
   }
   std::size_t numbers() const noexcept override { return numbers_; }
-  std::int64_t which(std::int64_t number) const noexcept override { return parts_ > 0 ? number % (8 * parts_) / 8 : 0; }   // all groups have as many
+  PointNumbers number_of(std::int32_t p, std::int32_t far, int part) const noexcept override;
   void bonds_changed(std::span<const std::int32_t> points) override;
   std::size_t factors() const noexcept override {
     return cloud_ && parts_ == 0 ? families_.bonds() : 0;
@@ -68,7 +68,7 @@ class Weighted final : public EvaluationSpace {
     double pressure[2][8];                ///< on their gradients, and its rate
     std::vector<std::int32_t> original;   ///< which of the set-up's evaluation points they are; empty: the same
   };
-  /// With damage: where the points are.
+  /// Where the points are.
   struct Place {
     std::uint32_t block, group;
     std::uint8_t lane;
@@ -106,7 +106,8 @@ class Weighted final : public EvaluationSpace {
   struct StoredStencil;
   template <class Stencil>
   std::int32_t evaluate_point(std::int32_t p, std::int64_t number, Stencil stencil, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy);
-  void find_numbers(std::int32_t p, const Group& g, Memory& m) const;
+  /// Which of the bonds of p at the set-up leads to `far`.
+  std::int32_t bond_at_set_up(std::int32_t p, std::int32_t far, const Group& g) const noexcept;
   /// Of evaluation point k of a point of a cloud, where they belong to bonds.
   std::size_t factor_of(std::int32_t p, int k) const noexcept {
     return static_cast<std::size_t>(cloud_->lists().first[static_cast<std::size_t>(p)]) + static_cast<std::size_t>(k);
@@ -159,7 +160,7 @@ class Weighted final : public EvaluationSpace {
   std::size_t fallbacks_ = 0, dropped_ = 0;
   ArrivingPieces pieces_;
   bool singles_ = false;  ///< some points are evaluated one by one: they use rows
-  std::vector<Place> place_;                     ///< by point, once bonds have failed
+  std::vector<Place> place_;                     ///< by point, once bonds have failed, and where evaluation points have numbers
   std::vector<std::vector<std::int32_t>> left_;  ///< by block: points that have left their group, ascending
   std::vector<std::unique_ptr<SparseStencils<D>>> remade_;  ///< clouds with few evaluation points: by point that has left, as its bonds are now; null: to be made
   AlignedVector<Row> u_rows_, w_rows_, out_rows_;

@@ -21,7 +21,9 @@ Weighted<D>::Weighted(const SpaceParts& parts)
   if (cloud_) cloud_colouring_ = cloud_colouring(body_, cloud_->lists(), CloudBlocks(body_), reach);
   quiet_ = parts.quiet_blocks(reach);
   singles_ = std::any_of(groups_.begin(), groups_.end(), [](const Group& g) { return g.stencil < 0; });
-  if (parts.numbered()) number_groups();
+  if (!parts.numbered()) return;
+  number_groups();
+  place_points();
 }
 
 template <int D>
