@@ -41,8 +41,8 @@ class LatticeVolumes final : public VolumetricState<D> {
   using typename Base::T;
 
  public:
-  explicit LatticeVolumes(const SpaceParts& parts)
-      : Base(parts),
+  LatticeVolumes(const SpaceParts& parts, const LawsOfSpace& laws)
+      : Base(parts, laws),
         families_(*parts.families.lattice()),
         tiles_(families_.tiles),
         operator_(families_),
@@ -54,7 +54,7 @@ class LatticeVolumes final : public VolumetricState<D> {
         felt_rows_(felt_rows(families_, felt_)) {}
 
   std::int64_t linearise(ConstFieldView u) override {
-    this->memory_.prepare([&] { return std::make_unique<typename Base::Memory>(this->parts_); });
+    this->prepare_memory();
     FirstBad bad;
     over_chunks(felt_chunks_, u, [&](const LatticeChunk& chunk, const double* H) {
       const LatticePattern& pattern = families_.pattern(chunk);
@@ -68,7 +68,7 @@ class LatticeVolumes final : public VolumetricState<D> {
         for (int c = 0; c < D * D; ++c) inverse_transpose_.component(c)[p] = (*inverse_transpose)(c / D, c % D);
       }
     });
-    return bad.point() >= 0 ? bad.point() : this->find_stiffnesses();
+    return bad.point() >= 0 ? bad.point() : this->find_stiffnesses(u);
   }
 
   void rates(ConstFieldView w, FieldView q) const override {
@@ -109,7 +109,7 @@ class LatticeVolumes final : public VolumetricState<D> {
   }
 
   void squares(ConstFieldView c, FieldView q) const override {
-    this->memory_.prepare([&] { return std::make_unique<typename Base::Memory>(this->parts_); });
+    this->prepare_memory();
     this->over_rows(this->roles_.own, [&](std::size_t i) { q.data[this->rows_.point(i)] = square(i, c, this->memory_.mine()); });
   }
 
@@ -163,12 +163,12 @@ class LatticeVolumes final : public VolumetricState<D> {
 }  // namespace
 
 template <int D>
-std::unique_ptr<VolumetricRows> make_lattice_volumes(const SpaceParts& parts) {
-  return std::make_unique<LatticeVolumes<D>>(parts);
+std::unique_ptr<VolumetricRows> make_lattice_volumes(const SpaceParts& parts, const LawsOfSpace& laws) {
+  return std::make_unique<LatticeVolumes<D>>(parts, laws);
 }
 
-template std::unique_ptr<VolumetricRows> make_lattice_volumes<1>(const SpaceParts&);
-template std::unique_ptr<VolumetricRows> make_lattice_volumes<2>(const SpaceParts&);
-template std::unique_ptr<VolumetricRows> make_lattice_volumes<3>(const SpaceParts&);
+template std::unique_ptr<VolumetricRows> make_lattice_volumes<1>(const SpaceParts&, const LawsOfSpace&);
+template std::unique_ptr<VolumetricRows> make_lattice_volumes<2>(const SpaceParts&, const LawsOfSpace&);
+template std::unique_ptr<VolumetricRows> make_lattice_volumes<3>(const SpaceParts&, const LawsOfSpace&);
 
 }  // namespace perikit

@@ -5,6 +5,7 @@
 #include "core/symmetric_matrix.hpp"
 #include "maps/selective_tangent.hpp"
 #include "maps/selective_map.hpp"
+#include "operators/volume_stiffness.hpp"
 
 namespace perikit {
 
@@ -165,6 +166,18 @@ int TangentBatch<D>::evaluate_selective(int first, int n, double time_step) {
     selective_tangent<D>(in, own_.data() + lane, mixed_.data() + lane, back_.data() + lane, bar_.data() + lane);
   }
   return -1;
+}
+
+template <int D>
+double TangentBatch<D>::volume_stiffness(int lane) const noexcept {
+  const int all = laws_.components();
+  double F[9], P[9], AF[9] = {};
+  for (int c = 0; c < all; ++c) {
+    F[c] = mapped_[static_cast<std::size_t>(c * batch_points + lane)] + (c >= D * D || c % (D + 1) == 0 ? 1.0 : 0.0);
+    P[c] = P_[static_cast<std::size_t>(c * batch_points + lane)];
+  }
+  for (int k = 0; k < all * all; ++k) AF[k / all] += A_[static_cast<std::size_t>(k * batch_points + lane)] * F[k % all];
+  return weight_[static_cast<std::size_t>(lane)] * perikit::volume_stiffness(all, 1, F, P, AF);
 }
 
 template class TangentBatch<1>;

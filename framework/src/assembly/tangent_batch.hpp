@@ -39,6 +39,8 @@ class TangentBatch {
   /// Returns the first inadmissible lane or -1. time_step: of the step that ends at the gradients [s]. convex: the matrices of each lane together lose
   /// their negative eigenvalues.
   int evaluate(double time_step, bool convex = false);
+  /// Selective map, of no more than batch_points lanes: W times the volume stiffness at the mapped gradient (operators/volume_stiffness.hpp).
+  double volume_stiffness(int lane) const noexcept;
   int owner(int lane) const noexcept { return owner_[static_cast<std::size_t>(lane)]; }
   /// W dP/dFt, W dP/dFbar, W dPbar/dFt, W dPbar/dFbar: see selective_tangent.
   double* own(int lane) noexcept { return own_.data() + static_cast<std::size_t>(lane) * entries; }

@@ -27,21 +27,21 @@ class StoredRows final : public VolumetricState<D> {
   using Base::rows_;
 
  public:
-  explicit StoredRows(const SpaceParts& parts)
-      : Base(parts), own_(rows_.size()), row_(rows_.bonds()), column_(rows_.bonds()) {
+  StoredRows(const SpaceParts& parts, const LawsOfSpace& laws)
+      : Base(parts, laws), own_(rows_.size()), row_(rows_.bonds()), column_(rows_.bonds()) {
     for (const std::int32_t j : rows_.lists().neighbour)
       far_.push_back(static_cast<std::int32_t>(rows_.point(static_cast<std::size_t>(j))));
   }
 
   std::int64_t linearise(ConstFieldView u) override {
-    this->memory_.prepare([&] { return std::make_unique<Memory>(this->parts_); });
+    this->prepare_memory();
     FirstBad bad;
     this->over_rows(roles_.felt, [&](std::size_t i) {
       if (!make_row(i, u, this->memory_.mine())) bad.report(static_cast<std::int64_t>(rows_.point(i)));
     });
     if (bad.point() >= 0) return bad.point();
     this->over_rows(roles_.complete, [&](std::size_t i) { transpose_row(i); });
-    return this->find_stiffnesses();
+    return this->find_stiffnesses(u);
   }
 
   void rates(ConstFieldView w, FieldView q) const override {
@@ -134,11 +134,11 @@ class StoredRows final : public VolumetricState<D> {
 
 }  // namespace
 
-std::unique_ptr<VolumetricRows> make_volumetric_rows(const SpaceParts& parts) {
+std::unique_ptr<VolumetricRows> make_volumetric_rows(const SpaceParts& parts, const LawsOfSpace& laws) {
   const bool plain = parts.families.lattice() && parts.formulation.order == 1 && !parts.shift.data;
   return with_dimension(parts.families.body().dimension(), [&](auto d) -> std::unique_ptr<VolumetricRows> {
-    if (plain) return make_lattice_volumes<d>(parts);
-    return std::make_unique<StoredRows<d>>(parts);
+    if (plain) return make_lattice_volumes<d>(parts, laws);
+    return std::make_unique<StoredRows<d>>(parts, laws);
   });
 }
 

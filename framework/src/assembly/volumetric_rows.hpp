@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "assembly/block_rows.hpp"
+#include "assembly/tangent_batch.hpp"
 #include "perikit/core/evaluation_status.hpp"
-#include "spaces/evaluation_space.hpp"
 
 namespace perikit {
 
@@ -25,7 +25,7 @@ class VolumetricRows {
   virtual ConstFieldView stiffness() const = 0;
 };
 
-/// For selective kinematics. What `parts` refers to must outlive the rows.
-std::unique_ptr<VolumetricRows> make_volumetric_rows(const SpaceParts& parts);
+/// For selective kinematics. What `parts` and `laws` refer to must outlive the rows.
+std::unique_ptr<VolumetricRows> make_volumetric_rows(const SpaceParts& parts, const LawsOfSpace& laws);
 
 }  // namespace perikit

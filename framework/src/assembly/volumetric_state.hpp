@@ -8,6 +8,7 @@
 
 #include "assembly/assembly.hpp"
 #include "assembly/row_roles.hpp"
+#include "assembly/tangent_batch.hpp"
 #include "assembly/volumetric_rows.hpp"
 #include "operators/volume_stiffness.hpp"
 #include "perikit/core/tensor.hpp"
@@ -27,15 +28,17 @@ class VolumetricState : public VolumetricRows {
 
   /// Memory of a thread.
   struct Memory {
-    explicit Memory(const SpaceParts& parts) : points(parts) {}
+    Memory(const SpaceParts& parts, const LawsOfSpace& laws) : points(parts), lanes(laws, true) {}
     EvaluationPoints<D> points;
+    TangentBatch<D> lanes;   ///< of points near interfaces
     LawScratch law;
     alignas(64) double H[9 * batch_points] = {}, F[9 * batch_points] = {}, P[9 * batch_points], dP[9 * batch_points];
     std::int32_t owner[batch_points];
   };
 
-  explicit VolumetricState(const SpaceParts& parts)
+  VolumetricState(const SpaceParts& parts, const LawsOfSpace& laws)
       : parts_(parts),
+        laws_(laws),
         rows_(parts.families),
         roles_(rows_, parts.laws),
         H_(rows_.body().make_field(D * D)),
@@ -77,16 +80,23 @@ class VolumetricState : public VolumetricRows {
   }
 
   /// Stiffness of the points that are this rank's. Field index of the first one where the law has none, or -1.
-  std::int64_t find_stiffnesses() {
+  std::int64_t find_stiffnesses(ConstFieldView u) {
     FirstBad bad;
     over_batches(roles_.own, [&](std::span<const std::int32_t> rows) {
       const std::int64_t point = find_stiffness(rows, memory_.mine());
-      if (point >= 0) bad.report(point);
+      if (point >= 0) return bad.report(point);
+      for (const std::int32_t row : rows)
+        if (const std::size_t p = rows_.point(static_cast<std::size_t>(row)); laws_.laminates && laws_.laminates->near(static_cast<std::int32_t>(p)))
+          if (!find_stiffness_of_laminates(p, u, memory_.mine())) bad.report(static_cast<std::int64_t>(p));
     });
     return bad.point();
   }
+  void prepare_memory() const {
+    memory_.prepare([&] { return std::make_unique<Memory>(parts_, laws_); });
+  }
 
   SpaceParts parts_;
+  LawsOfSpace laws_;
   BlockRows rows_;
   RowRoles roles_;
   mutable PerThread<Memory> memory_;
@@ -114,9 +124,47 @@ class VolumetricState : public VolumetricRows {
     for (int l = 0; l < n; ++l) {
       const std::size_t i = row(l), p = rows_.point(i);
       const double weight = rows_.volume(i) * (1 - parts_.families.damage(p)), share = share_.data()[p];
-      stiffness_.data()[p] = weight * share * share * volume_stiffness(S::components, l, m.F, m.P, m.dP);
+      stiffness_.data()[p] = weight * share * share * volume_stiffness(S::components, batch_points, m.F + l, m.P + l, m.dP + l);
     }
     return -1;
+  }
+
+  /// Near interfaces the stiffness of the evaluation points in place of that of one law. Of two materials in layers the softer one takes most of a
+  /// change of volume: a stiffness that is too large would leave the rest of the tangent indefinite. False where the law has none.
+  bool find_stiffness_of_laminates(std::size_t p, ConstFieldView u, Memory& m) {
+    const double share = share_.data()[p];
+    if (!(stiffness_.data()[p] > 0)) return true;
+    m.points.read(p);
+    double sum = 0;
+    const auto finish = [&] {
+      if (m.lanes.evaluate(0) >= 0) return false;
+      for (int lane = 0; lane < m.lanes.lanes(); ++lane) sum += m.lanes.volume_stiffness(lane);
+      m.lanes.clear();
+      return true;
+    };
+    m.lanes.clear();
+    for (int q = 0; q < m.points.points(); ++q) {
+      if (m.lanes.lanes() == batch_points && !finish()) return false;
+      const double weight = m.points.weight(q);
+      if (weight == 0) continue;
+      const int lane = m.lanes.add(p, m.points.far(q), q, weight, share);
+      for (int c = 0; c < D; ++c) {
+        double own[2][D], H[D];
+        const auto gradient_at = [&](std::size_t at) -> const double* {
+          double* const to = own[at == p ? 0 : 1];
+          for (int e = 0; e < D; ++e) to[e] = H_.component(c * D + e)[at];
+          return to;
+        };
+        m.points.gradient_of(q, [&](std::size_t at) { return u.component(c)[at]; }, gradient_at, H);
+        for (int e = 0; e < D; ++e) {
+          m.lanes.H(lane, c * D + e) = H[e];
+          m.lanes.owner_H(lane, c * D + e) = H_.component(c * D + e)[p];
+        }
+      }
+    }
+    if (!finish()) return false;
+    stiffness_.data()[p] = share * share * sum;
+    return true;
   }
 
   Field H_;                        ///< Fbar - I at the state of the rows
@@ -126,6 +174,6 @@ class VolumetricState : public VolumetricRows {
 
 /// On a lattice, with point gradients of order 1: products of whole rows of points, without stored stencils.
 template <int D>
-std::unique_ptr<VolumetricRows> make_lattice_volumes(const SpaceParts& parts);
+std::unique_ptr<VolumetricRows> make_lattice_volumes(const SpaceParts& parts, const LawsOfSpace& laws);
 
 }  // namespace perikit

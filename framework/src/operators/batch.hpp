@@ -135,9 +135,6 @@ class BatchWork {
 
   /// With Work::sample: stresses of the selective map become derivatives by the gradients that came in, W times; with pressures.
   void pull_back() noexcept { pulled_back_ = true; }
-  /// With Work::sample, after the selective map: what is sampled as the energy is its second derivative by ln J, where F grows alike in all
-  /// directions.
-  void sample_volume_stiffness() noexcept { volume_stiffness_ = true; }
 
   /// With Work::force, of evaluation points that belong to both ends of bonds of one law, without selective map, history and laminates: adds the
   /// samples of the lanes here as well.
@@ -223,8 +220,6 @@ class BatchWork {
   };
   void find_laws(int n, const BatchScratch& s, int ends, BondLaws& laws) const noexcept;
   LawBatch own_gradients(int n, BatchScratch& s) const noexcept;
-  void set_growth(int n, BatchScratch& s) const noexcept;
-  void put_volume_stiffness(int n, BatchScratch& s) const noexcept;
   int evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept;
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
@@ -234,7 +229,7 @@ class BatchWork {
   const Laws& laws_;
   Work work_;
   bool energy_;
-  bool selective_, pulled_back_ = false, volume_stiffness_ = false;
+  bool selective_, pulled_back_ = false;
   MaterialPoints* points_;               ///< null where nothing is remembered
   double time_step_;
   bool ends_step_;

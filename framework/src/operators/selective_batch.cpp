@@ -2,24 +2,9 @@
 
 #include "maps/selective_laws.hpp"
 #include "operators/batch.hpp"
-#include "operators/volume_stiffness.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {
-
-/// dH <- F: the rate of ln J is 3.
-void BatchWork::set_growth(int n, BatchScratch& s) const noexcept {
-  const int d = dimension(laws_.space()), components = tensor_components(laws_.space());
-  for (int c = 0; c < components; ++c) {
-    const double own = c >= d * d || c % (d + 1) == 0 ? 1.0 : 0.0;
-    for (int l = 0; l < n; ++l) s.dH[c * batch_points + l] = own + s.H[c * batch_points + l];
-  }
-}
-
-/// In place of the energies, with dH = F and other = A : F.
-void BatchWork::put_volume_stiffness(int n, BatchScratch& s) const noexcept {
-  for (int l = 0; l < n; ++l) s.psi[l] = volume_stiffness(tensor_components(laws_.space()), l, s.dH, s.P, s.other);
-}
 
 namespace {
 
@@ -218,8 +203,7 @@ int BatchWork::mapped_pass(int n, BatchScratch& s, int ends) const noexcept {
   const bool tangent = work_ == Work::tangent;
   const SelectiveBatch batch{lanes, ends, s.Ht, tangent ? s.dHt : nullptr, s.owner_volumes, s.inverse, s.growth};
   selective_map(laws_.space(), batch, s.H, s.dH);
-  if (volume_stiffness_) set_growth(lanes, s);
-  double* const rate = tangent || volume_stiffness_ ? s.other : nullptr;
+  double* const rate = tangent ? s.other : nullptr;
   const bool one_law = this->one_law(s);
   if (ends == 2 && !one_law) std::copy_n(s.far, lanes, s.owner + lanes);
   if (ends == 2 && points_) {
@@ -250,7 +234,6 @@ int BatchWork::mapped_pass(int n, BatchScratch& s, int ends) const noexcept {
     tidy(s.growth, ends * lanes);
     tidy(s.inverse, lanes);
   }
-  if (volume_stiffness_) put_volume_stiffness(n, s);
   if (work_ == Work::sample && !pulled_back_) return -1;
   selective_pull_back(laws_.space(), batch, {tangent ? -1.0 : 1.0, {s.weight, s.far_weight}, s.P, tangent ? s.other : nullptr, s.P, s.pressure, s.pressure_rate});
   return -1;

@@ -26,6 +26,8 @@ class EvaluationPoints {
   std::size_t bonds() const noexcept { return family_.far.size(); }
   bool at_bonds() const noexcept { return parts_of_family_ == 0; }
   int points() const noexcept { return at_bonds() ? static_cast<int>(bonds()) : parts_of_family_; }
+  /// The far end of the bond that q belongs to; -1: it belongs to a part or to the point.
+  std::int32_t far(int q) const noexcept { return at_bonds() ? family_.far[static_cast<std::size_t>(q)] : -1; }
   /// W_q [m^3]; 0: the evaluation point stores nothing.
   double weight(int q);
   /// The gradient of the point itself.

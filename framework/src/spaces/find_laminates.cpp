@@ -81,7 +81,7 @@ class LaminateSearch {
     EvaluationPoints<D>& points = readers_.mine();
     points.read(p);
     for (int q = 0; q < points.points(); ++q) {
-      const std::int32_t far = points.at_bonds() ? points.family().far[static_cast<std::size_t>(q)] : -1;
+      const std::int32_t far = points.far(q);
       if (points.weight(q) == 0 || (far >= 0 && far < owner && parts_.bonds_once())) continue;
       Seen one{space_.number_of(owner, far, q).point, {}};
       one.point.share = -1;

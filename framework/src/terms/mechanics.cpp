@@ -68,7 +68,7 @@ std::vector<HistoryPlace> Mechanics::history_points() {
     const bool own = body.owns(at), of_bonds = points.at_bonds();
     if (of_bonds) points.read(at);
     for (int q = 0; q < points.points(); ++q) {
-      const std::int32_t far = of_bonds ? points.family().far[static_cast<std::size_t>(q)] : -1;
+      const std::int32_t far = points.far(q);
       // Parts of families that have become too poor for a gradient have no weight, until so many bonds have failed that one of them is all
       // that its point has. Their history goes on meanwhile.
       if (of_bonds && (points.weight(q) == 0 || (parts_.bonds_once() && far < p))) continue;
@@ -205,56 +205,10 @@ std::unique_ptr<Assembly> Mechanics::make_assembly(const BlockRows& rows) {
   });
 }
 
-std::int64_t Mechanics::stiffness_near_laminates(ConstFieldView u, FieldView stiffness) {
-  const Body& body = parts_.families.body();
-  const GroupMarks& marks = laminates_->near();
-  const GroupMarks near = parts_.families.around(marks);
-  Field sums = body.make_field(1);
-  const SampleSums to{.weight = nullptr, .psi = sums.data(), .H = nullptr, .P = nullptr, .cauchy = nullptr, .von_mises = nullptr, .stride = body.stride()};
-  BatchWork work = this->work({u, 0}, {.work = Work::sample});
-  work.sample_volume_stiffness();
-  Pass pass{work, u, {}, {}, &to, nullptr, -1, {}, marks.data(), near.data()};
-  space_->run(pass);
-  for (const std::int32_t index : body.owned()) {
-    const auto p = static_cast<std::size_t>(index);
-    const double share = parts_.families.remaining_influence(p);
-    if (laminates_->near(index) && stiffness.data[p] > 0) stiffness.data[p] = share * share * sums.data()[p];
-  }
-  return pass.bad;
-}
-
-/// Rows whose points near interfaces have the stiffness of their laminates in place of that of one law. Of two materials in layers the softer one
-/// takes most of a change of volume: a stiffness that is too large would leave the rest of the tangent indefinite.
-class Mechanics::LaminateVolumes final : public VolumetricRows {
- public:
-  LaminateVolumes(Mechanics& mechanics, std::unique_ptr<VolumetricRows> rows)
-      : mechanics_(mechanics), rows_(std::move(rows)), stiffness_(mechanics.parts_.families.body().make_field(1)) {}
-
-  std::int64_t linearise(ConstFieldView u) override {
-    const std::int64_t bad = rows_->linearise(u);
-    if (bad >= 0) return bad;
-    const ConstFieldView of_one_law = rows_->stiffness();
-    std::copy_n(of_one_law.data, of_one_law.size(), stiffness_.data());
-    return mechanics_.stiffness_near_laminates(u, stiffness_);
-  }
-  void rates(ConstFieldView w, FieldView q) const override { rows_->rates(w, q); }
-  void forces(ConstFieldView q, FieldView f) const override { rows_->forces(q, f); }
-  void squares(ConstFieldView c, FieldView q) const override { rows_->squares(c, q); }
-  ConstFieldView logarithms() const override { return rows_->logarithms(); }
-  ConstFieldView stiffness() const override { return stiffness_; }
-
- private:
-  Mechanics& mechanics_;
-  std::unique_ptr<VolumetricRows> rows_;
-  Field stiffness_;
-};
-
 std::unique_ptr<VolumetricRows> Mechanics::make_volumetric_rows() {
   const Formulation& f = parts_.formulation;
   if (!f.selective() || f.force_state != ForceState::variational) return nullptr;
-  std::unique_ptr<VolumetricRows> rows = perikit::make_volumetric_rows(parts_);
-  if (laminates_) rows = std::make_unique<LaminateVolumes>(*this, std::move(rows));
-  return rows;
+  return perikit::make_volumetric_rows(parts_, {*points_, *space_, laminates_.get()});
 }
 
 void Mechanics::report(ModelReport& report) const {

@@ -48,10 +48,6 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   void find_laminates(GroupMarks marks, bool again);
   template <int D>
   std::vector<HistoryPlace> history_points();
-  class LaminateVolumes;
-  /// stiffness <- that of the volumes of points whose evaluation points may be laminates (VolumetricRows), where it is not 0. Field index of
-  /// an inadmissible point, or -1.
-  std::int64_t stiffness_near_laminates(ConstFieldView u, FieldView stiffness);
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;
