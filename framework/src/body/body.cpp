@@ -166,7 +166,6 @@ void Body::place_on_lattice(const Lattice& lattice, double volume, const std::ve
 /// What follows from the lattice and the cells that are kept.
 void Body::number_lattice(const Lattice& lattice, double volume) {
   stride_ = static_cast<std::size_t>(lattice.cells);
-  margin_ = padding;
   uniform_volume_ = volume;
   lattice_ = lattice;
   input_.assign(stride_, -1);
@@ -194,7 +193,6 @@ void Body::place_cloud(const std::vector<Point>& positions, const std::vector<do
 
 /// What follows from the order of the points.
 void Body::number_cloud() {
-  margin_ = padding;
   input_.assign(stride_, -1);
   alive_.assign(stride_ / 8, 0);
   for (std::size_t n = 0; n < internal_.size(); ++n) {

@@ -24,10 +24,10 @@ void unpack(std::span<const double> values, std::span<const std::int32_t> points
 
 }  // namespace
 
-FirstRank::FirstRank(const Body& part, std::span<const std::int32_t> points) : part_(&part), points_(points.begin(), points.end()) {
+FirstRank::FirstRank(const Points& all, std::span<const std::int32_t> points) : all_(all), points_(points.begin(), points.end()) {
   std::vector<std::int32_t> mine;
   for (const std::int32_t p : points_)
-    mine.push_back(static_cast<std::int32_t>(part.places().place[static_cast<std::size_t>(p)]));
+    mine.push_back(static_cast<std::int32_t>(all.places().place[static_cast<std::size_t>(p)]));
   for (const std::vector<std::byte>& of_rank : communicator().gather(std::as_bytes(std::span(mine)))) {
     std::vector<std::int32_t>& places = places_.emplace_back(of_rank.size() / sizeof(std::int32_t));
     if (!of_rank.empty()) std::memcpy(places.data(), of_rank.data(), of_rank.size());
@@ -48,7 +48,7 @@ Field FirstRank::gather(ConstFieldView mine) const {
     messages.push_back({static_cast<int>(rank), {}, values[rank]});
   }
   communicator().exchange(messages);
-  Field whole(mine.components, part_->places().stride);
+  Field whole(mine.components, all_.places().stride);
   for (std::size_t rank = 0; rank < places_.size(); ++rank) unpack(values[rank], places_[rank], whole);
   return whole;
 }
@@ -74,13 +74,13 @@ void FirstRank::scatter(ConstFieldView whole, FieldView mine) const {
 BlockMatrix FirstRank::gather(const BlockMatrix& mine) const {
   const std::size_t size = static_cast<std::size_t>(mine.dimension * mine.dimension);
   const auto place = [&](std::int32_t p) {
-    return static_cast<std::int32_t>(part_->places().place[static_cast<std::size_t>(p)]);
+    return static_cast<std::int32_t>(all_.places().place[static_cast<std::size_t>(p)]);
   };
   // Of each own row: its place, how many blocks it has, and the places of their columns.
   std::vector<std::int32_t> rows;
   std::vector<double> blocks;
-  std::vector<std::uint8_t> own(part_->stride(), 0);
-  for (const std::int32_t p : part_->owned()) own[static_cast<std::size_t>(p)] = 1;
+  std::vector<std::uint8_t> own(all_.stride(), 0);
+  for (const std::int32_t p : all_.owned()) own[static_cast<std::size_t>(p)] = 1;
   for (std::size_t r = 0; r < mine.rows(); ++r) {
     if (!own[static_cast<std::size_t>(mine.point[r])]) continue;
     const std::int64_t begin = mine.row_first[r], end = mine.row_first[r + 1];
@@ -107,7 +107,7 @@ BlockMatrix FirstRank::gather(const BlockMatrix& mine) const {
     block += static_cast<std::size_t>(row.count) * size;
   }
   std::ranges::sort(found, {}, &Row::place);
-  std::vector<std::int32_t> row_at(part_->places().stride, -1);
+  std::vector<std::int32_t> row_at(all_.places().stride, -1);
   for (const Row& row : found) {
     row_at[static_cast<std::size_t>(row.place)] = static_cast<std::int32_t>(whole.point.size());
     whole.point.push_back(row.place);

@@ -41,7 +41,7 @@ Field accelerations(Problem& problem, double t) {
   const ConstFieldView internal = problem.state().internal_force();
   const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
   for (int c = 0; c < problem.dimension(); ++c)
-    for (const std::int32_t index : problem.body().owned()) {
+    for (const std::int32_t index : problem.points().owned()) {
       const auto p = static_cast<std::size_t>(index);
       a.component(c)[p] = (internal.component(c)[p] + (external.data ? external.component(c)[p] : 0.0)) / masses[p];
     }
@@ -69,10 +69,10 @@ Field reactions(Problem& problem, bool dynamic, double t, Field memory) {
 }
 
 Field reaction_couples(Problem& problem, Field memory) {
-  const Body& body = problem.body();
+  const Points& points = problem.points();
   Field couples = std::move(memory);
   if (couples.size() == 0)
-    couples = body.make_field(body.dimension() == 3 ? 3 : 1);
+    couples = points.make_field(points.dimension() == 3 ? 3 : 1);
   else
     couples.fill(0.0);
   if (!problem.images()) return couples;
@@ -80,10 +80,10 @@ Field reaction_couples(Problem& problem, Field memory) {
   Field u = problem.make_field(), on_images = problem.make_field();
   const ConstFieldView internal = problem.state().internal_force(), displacement = problem.state().displacement();
   const FieldView external = problem.loads().any() ? problem.state().external_force() : FieldView{};
-  for (const std::int32_t p : body.internal())
-    for (int c = 0; c < body.dimension(); ++c) {
+  for (const std::int32_t p : points.live())
+    for (int c = 0; c < points.dimension(); ++c) {
       u.component(c)[p] = displacement.component(c)[p];
-      if (body.image(static_cast<std::size_t>(p))) on_images.component(c)[p] = -internal.component(c)[p] - (external.data ? external.component(c)[p] : 0.0);
+      if (points.image(static_cast<std::size_t>(p))) on_images.component(c)[p] = -internal.component(c)[p] - (external.data ? external.component(c)[p] : 0.0);
     }
   problem.share(u);
   problem.images()->extend(u);
@@ -91,24 +91,24 @@ Field reaction_couples(Problem& problem, Field memory) {
   return couples;
 }
 
-std::vector<Field> rigid_motions(const Body& body, ConstFieldView u) {
-  const int d = body.dimension();
+std::vector<Field> rigid_motions(const Points& points, ConstFieldView u) {
+  const int d = points.dimension();
   Point middle{};
   for (std::size_t c = 0; c < 3; ++c) {
     ExactSum sum;
-    for (const std::int32_t p : body.owned()) sum.add(body.position(static_cast<std::size_t>(p))[c]);
-    middle[c] = total_over_ranks(sum) / static_cast<double>(body.points_of_all_ranks());
+    for (const std::int32_t p : points.owned()) sum.add(points.position(static_cast<std::size_t>(p))[c]);
+    middle[c] = total_over_ranks(sum) / static_cast<double>(points.size_on_all_ranks());
   }
-  double size = body.spacing();
-  for (const std::int32_t p : body.owned())
+  double size = points.spacing();
+  for (const std::int32_t p : points.owned())
     for (std::size_t c = 0; c < 3; ++c)
-      size = std::max(size, std::abs(body.position(static_cast<std::size_t>(p))[c] - middle[c]));
+      size = std::max(size, std::abs(points.position(static_cast<std::size_t>(p))[c] - middle[c]));
   size = communicator().largest(size);
   std::vector<Field> motions;
-  for (int k = 0; k < d * (d + 1) / 2; ++k) motions.push_back(body.make_field(d));
-  for (const std::int32_t index : body.internal()) {
+  for (int k = 0; k < d * (d + 1) / 2; ++k) motions.push_back(points.make_field(d));
+  for (const std::int32_t index : points.live()) {
     const auto p = static_cast<std::size_t>(index);
-    Point y = body.position(p);
+    Point y = points.position(p);
     for (int c = 0; c < d; ++c) {
       y[static_cast<std::size_t>(c)] += u.component(c)[p] - middle[static_cast<std::size_t>(c)];
       motions[static_cast<std::size_t>(c)].component(c)[p] = 1;

@@ -1,6 +1,7 @@
 #include "perikit/problem/state.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/ranks/numbered_rows.hpp"
 #include "perikit/core/errors.hpp"
@@ -8,14 +9,14 @@
 
 namespace perikit {
 
-State::State(const Body& body) : body_(&body) {
-  displacement_ = declare("displacement", body.dimension());
-  internal_force_ = declare("internal_force", body.dimension());
+State::State(Points points) : points_(std::move(points)) {
+  displacement_ = declare("displacement", points_.dimension());
+  internal_force_ = declare("internal_force", points_.dimension());
 }
 
 FieldView State::declare(const std::string& name, int components) {
   const auto [entry, fresh] = fields_.try_emplace(name);
-  if (fresh) entry->second = body_->make_field(components);
+  if (fresh) entry->second = points_.make_field(components);
   return entry->second;
 }
 
@@ -33,12 +34,12 @@ std::size_t State::bytes() const noexcept {
 
 namespace {
 
-/// Points and images of a part that no other rank has, in the order of the whole body.
+/// Points and images here that no other rank has, in the order of fields over the points of all ranks.
 struct OwnPlaces {
-  explicit OwnPlaces(const Body& body) {
-    for (const std::int32_t p : body.internal())
-      if (body.owns(static_cast<std::size_t>(p))) points.push_back(p);
-    const auto place = body.places().place;
+  explicit OwnPlaces(const Points& all) {
+    for (const std::int32_t p : all.live())
+      if (all.owns(static_cast<std::size_t>(p))) points.push_back(p);
+    const auto place = all.places().place;
     std::ranges::sort(points, {}, [&](std::int32_t p) { return place[static_cast<std::size_t>(p)]; });
     for (const std::int32_t p : points) places.push_back(place[static_cast<std::size_t>(p)]);
   }
@@ -46,7 +47,7 @@ struct OwnPlaces {
   std::vector<std::int64_t> places;
 };
 
-/// visit(first, count) of the pieces of a component of the whole body.
+/// visit(first, count) of the pieces of a component over the points of all ranks.
 template <class Visit>
 void each_piece(std::size_t stride, Visit&& visit) {
   for (std::size_t first = 0; first < stride; first += rows_of_piece) visit(first, std::min(rows_of_piece, stride - first));
@@ -60,7 +61,7 @@ std::uint64_t State::written() const noexcept {
   for (const auto& [name, values] : numbers_) size += 2 * number + name.size() + values.size() * sizeof(double);
   for (const auto& [name, field] : fields_)
     size +=
-        2 * number + name.size() + static_cast<std::uint64_t>(field.components()) * body_->stride_of_all_ranks() * sizeof(double);
+        2 * number + name.size() + static_cast<std::uint64_t>(field.components()) * points_.stride_of_all_ranks() * sizeof(double);
   return size;
 }
 
@@ -86,15 +87,15 @@ void State::write_here(ByteWriter& out) const {
 }
 
 void State::write(ByteWriter& out) const {
-  if (!body_->part()) return write_here(out);
-  const OwnPlaces own(*body_);
+  if (!points_.distributed()) return write_here(out);
+  const OwnPlaces own(points_);
   write_numbers(out);
   std::vector<double> values;
   for (const auto& [name, field] : fields_) {
     out.text(name);
     out.value(static_cast<std::int64_t>(field.components()));
     for (int c = 0; c < field.components(); ++c)
-      each_piece(body_->stride_of_all_ranks(), [&, &field = field](std::size_t first, std::size_t count) {
+      each_piece(points_.stride_of_all_ranks(), [&, &field = field](std::size_t first, std::size_t count) {
         const std::vector<double> piece = gather_piece(own.places, first, count, 1, [&](std::size_t from, std::size_t to) {
           values.clear();
           for (std::size_t n = from; n < to; ++n) values.push_back(field.component(c)[own.points[n]]);
@@ -138,15 +139,15 @@ void State::read_here(ByteReader& in) {
 }
 
 void State::read(ByteReader& in) {
-  if (!body_->part()) return read_here(in);
-  const OwnPlaces own(*body_);
+  if (!points_.distributed()) return read_here(in);
+  const OwnPlaces own(points_);
   read_numbers(in);
   std::vector<double> values;
   for (auto left = in.value<std::uint64_t>(); left > 0; --left) {
     const FieldView field = declared_like(in);
     for (int c = 0; c < field.components; ++c) {
       std::size_t next = 0;
-      each_piece(body_->stride_of_all_ranks(), [&](std::size_t first, std::size_t count) {
+      each_piece(points_.stride_of_all_ranks(), [&](std::size_t first, std::size_t count) {
         values.resize(count);
         in.bytes(values.data(), count * sizeof(double));
         for (; next < own.points.size() && own.places[next] < static_cast<std::int64_t>(first + count); ++next)

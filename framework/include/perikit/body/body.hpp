@@ -79,6 +79,9 @@ constexpr std::size_t cloud_block_points(std::size_t points_of_all_ranks) noexce
   return size;
 }
 
+/// Zero points before and after each field, which kernels may read.
+inline constexpr std::size_t field_margin = padding;
+
 /// Internal indices run over [0, stride); only `points` of them are alive, the rest is padding of zero volume.
 class Body {
  public:
@@ -122,7 +125,7 @@ class Body {
   /// Null for clouds.
   const Lattice* lattice() const noexcept { return lattice_ ? &*lattice_ : nullptr; }
   /// A field with the margins that the kernels need.
-  Field make_field(int components) const { return Field(components, stride_, margin_); }
+  Field make_field(int components) const { return Field(components, stride_, field_margin); }
 
   /// Internal index of each input point, and back (-1: padding).
   std::span<const std::int32_t> internal() const noexcept { return internal_; }
@@ -194,7 +197,7 @@ class Body {
   void keep_far_material(const std::vector<Role>& roles, std::uint16_t far_material);
 
   BodyFrame frame_;
-  std::size_t stride_ = 0, margin_ = 0;
+  std::size_t stride_ = 0;
   std::optional<Lattice> lattice_;
   std::vector<std::int32_t> internal_;
   AlignedVector<double> positions_;     ///< clouds: rows of 4, {x, y, z, V}

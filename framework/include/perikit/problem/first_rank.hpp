@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "perikit/body/body.hpp"
+#include "perikit/body/points.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field.hpp"
@@ -14,8 +14,8 @@ namespace perikit {
 
 class FirstRank {
  public:
-  /// points: whose values fields on rank 0 have, internal indices, each on one rank alone. All ranks must call it, and everything below.
-  FirstRank(const Body& part, std::span<const std::int32_t> points);
+  /// points: those of `all` whose values fields on rank 0 have, each on one rank alone. All ranks must call it, and everything below.
+  FirstRank(const Points& all, std::span<const std::int32_t> points);
 
   /// On rank 0 a field over the whole body from the points of every rank, 0 elsewhere; empty on the others.
   Field gather(ConstFieldView mine) const;
@@ -26,7 +26,7 @@ class FirstRank {
   BlockMatrix gather(const BlockMatrix& mine) const;
 
  private:
-  const Body* part_;
+  Points all_;
   std::vector<std::int32_t> points_;
   std::vector<std::vector<std::int32_t>> places_;   ///< on rank 0: where those of each rank are in the whole body
 };

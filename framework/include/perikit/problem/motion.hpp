@@ -17,8 +17,8 @@ Field reactions(Problem& problem, bool dynamic, double t, Field memory = {});
 /// What holds a side of the body acts beyond the points that `reactions` gives it to. Its moment about where these points are [N m]: about z in
 /// 2D, about x, y and z in 3D. memory: of an earlier call, to be used again. All ranks must call it.
 Field reaction_couples(Problem& problem, Field memory = {});
-/// The motions of the body at u as a whole, d (d + 1)/2 fields of about the same size: translations, then rotations about its
+/// The motions of all points at u as one rigid body, d (d + 1)/2 fields of about the same size: translations, then rotations about its
 /// middle.
-std::vector<Field> rigid_motions(const Body& body, ConstFieldView u);
+std::vector<Field> rigid_motions(const Points& points, ConstFieldView u);
 
 }  // namespace perikit

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "perikit/body/points.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/model/configuration.hpp"
@@ -27,6 +28,7 @@ struct ProblemValues {
   Constraints constraints;
   Loads loads;
   const ImageMap* images = nullptr;   ///< null: the body has none. They are not owned; their displacements are constrained
+  Points points{body};                ///< of all bodies
 };
 
 /// Of bonds; 1, 1 where there are none.
@@ -41,6 +43,8 @@ class Problem {
   explicit Problem(ProblemValues& values) noexcept : values_(values) {}
   virtual ~Problem() = default;
 
+  /// All that most need to know of bodies: where fields hold which points.
+  const Points& points() const noexcept { return values_.points; }
   const Body& body() const noexcept { return values_.body; }
   const Laws& laws() const noexcept { return values_.laws; }
   State& state() noexcept { return values_.state; }
@@ -48,11 +52,11 @@ class Problem {
   Constraints& constraints() noexcept { return values_.constraints; }
   const Loads& loads() const noexcept { return values_.loads; }
   const ImageMap* images() const noexcept { return values_.images; }
-  int dimension() const noexcept { return body().dimension(); }
+  int dimension() const noexcept { return points().dimension(); }
   /// That of the state: its displacements at its time.
   Configuration configuration() const noexcept { return {values_.state.displacement(), values_.state.time}; }
   /// A new field of `dimension` components, zero, with the margins that the operations need: theirs must all come from here.
-  Field make_field() const { return body().make_field(dimension()); }
+  Field make_field() const { return points().make_field(dimension()); }
 
   /// Values of the owners of points -> ghosts of a field that has at most `dimension` components and is nobody else's: in fields of the problem
   /// ghosts are zero. All ranks must call it.

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "perikit/body/body.hpp"
+#include "perikit/body/points.hpp"
 #include "perikit/core/field.hpp"
 
 namespace perikit {
@@ -16,7 +16,7 @@ namespace perikit {
 class ByteReader;
 class ByteWriter;
 
-/// Totals over the body [J]; external_work is what boundaries and loads have put in. dissipated: by bonds that failed, by laws and by
+/// Totals over all bodies [J]; external_work is what boundaries and loads have put in. dissipated: by bonds that failed, by laws and by
 /// terms; the part of the latter two is dissipated_by_laws.
 struct Energies {
   double strain = 0, kinetic = 0, external_work = 0, dissipated = 0, dissipated_by_laws = 0;
@@ -26,8 +26,8 @@ struct Energies {
 /// and stay zero. Every run variable of an integrator is declared here, so that snapshots hold it and a run goes on bitwise.
 class State {
  public:
-  /// Of the points of `body`, which must outlive the state. Everything is zero at first.
-  explicit State(const Body& body);
+  /// Their bodies must outlive the state. Everything is zero at first.
+  explicit State(Points points);
   State(State&&) = default;
 
   double time = 0;          ///< [s], or the load parameter in [0, 1]
@@ -64,7 +64,7 @@ class State {
   void read_numbers(ByteReader& in);
   FieldView declared_like(ByteReader& in);
 
-  const Body* body_;
+  Points points_;
   std::map<std::string, Field> fields_;
   std::map<std::string, std::vector<double>> numbers_;
   FieldView displacement_, internal_force_;
