@@ -21,7 +21,7 @@ constexpr double noticed = 0.01;
 
 /// On whatever rank.
 bool has_nearly_incompressible(const Problem& problem) {
-  const bool here = std::ranges::any_of(problem.body().owned(), [&](std::int32_t index) {
+  const bool here = std::ranges::any_of(problem.points().owned(), [&](std::int32_t index) {
     const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(index));
     return moduli.mu > 0 && moduli.bulk() >= nearly_incompressible * moduli.mu;
   });
@@ -30,8 +30,8 @@ bool has_nearly_incompressible(const Problem& problem) {
 
 /// By point, of ghosts, too.
 Field shared(Problem& problem, ConstFieldView of_owners) {
-  Field all = problem.body().make_field(1);
-  for (const std::int32_t p : problem.body().owned()) all.data()[p] = of_owners.data[p];
+  Field all = problem.points().make_field(1);
+  for (const std::int32_t p : problem.points().owned()) all.data()[p] = of_owners.data[p];
   problem.share(all);
   return all;
 }
@@ -51,8 +51,8 @@ double energy_of_alternating_volumes(Problem& problem, ConstFieldView u) {
   ExactSum energy;
   for (std::size_t r = 0; r < neighbours.rows(); ++r) {
     const auto point = static_cast<std::size_t>(neighbours.point[r]);
-    if (!problem.body().owns(point)) continue;
-    if (stiffness[point] < nearly_incompressible * problem.laws().moduli(point).mu * problem.body().volume(point)) continue;
+    if (!problem.points().owns(point)) continue;
+    if (stiffness[point] < nearly_incompressible * problem.laws().moduli(point).mu * problem.points().volume(point)) continue;
     double sum = 0;
     int count = 0;
     for (std::int64_t b = neighbours.row_first[r]; b < neighbours.row_first[r + 1]; ++b) {

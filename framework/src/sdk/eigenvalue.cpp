@@ -43,12 +43,12 @@ EigenvalueBounds eigenvalue_bounds(Problem& problem, ConstFieldView u, ConstFiel
     copy(vector, start);
   }
   if (!warm) {
-    fill_with_noise(scale, 1, problem.body().places(), vector);
+    fill_with_noise(scale, 1, problem.points().places(), vector);
   } else {
     // A little noise: a symmetric eigenvector must not hide a growing one of another symmetry.
     const double size =
-        norm(vector) / std::sqrt(static_cast<double>(problem.body().points_of_all_ranks() * static_cast<std::size_t>(d)));
-    fill_with_noise(scale, 1, problem.body().places(), w);
+        norm(vector) / std::sqrt(static_cast<double>(problem.points().size_on_all_ranks() * static_cast<std::size_t>(d)));
+    fill_with_noise(scale, 1, problem.points().places(), w);
     combine(1, vector, 0.05 * size, w, vector);
   }
   const double size = norm(vector);
@@ -90,7 +90,7 @@ double largest_eigenvalue(Problem& problem, ConstFieldView u, ConstFieldView sca
 double largest_eigenvalue(Problem& problem, DamagedPart& part, ConstFieldView u, ConstFieldView scale, double enough) {
   // Parts are small: vectors hold their entries alone.
   Field w = problem.make_field(), Kw = problem.make_field();
-  fill_with_noise(part.inside(), 1, problem.body().places(), w);
+  fill_with_noise(part.inside(), 1, problem.points().places(), w);
   std::vector<std::size_t> entries;
   for (std::size_t k = 0; k < w.size(); ++k)
     if (w.data()[k] != 0 && scale.data[k] != 0) entries.push_back(k);

@@ -23,7 +23,7 @@ void Equilibrium::begin(double t, ConstFieldView u, double time_step) {
   copy(u, u_);
   if (external_.data && !problem_.loads().follow()) problem_.loads().evaluate(t, external_);
   Field noise = problem_.make_field();
-  fill_with_noise(free_, 1, problem_.body().places(), noise);
+  fill_with_noise(free_, 1, problem_.points().places(), noise);
   const double size = norm(noise);
   // Where the start itself is inadmissible there is nothing to estimate; the first residual says so.
   if (size > 0 && problem_.tangent_action(at(u), noise, scratch_).ok()) stiffness_ = norm(scratch_) / size;

@@ -103,7 +103,7 @@ class LoadSteps {
 
   /// A first step that has to find what should have been there at its start may take long, or end elsewhere.
   void warn_of_jumps() {
-    if (const double gap = equilibrium_.missing(u_, driving_); gap > 1e-12 * problem_.body().spacing())
+    if (const double gap = equilibrium_.missing(u_, driving_); gap > 1e-12 * problem_.points().spacing())
       observer_.log(
           named("first_step", fmt::format("warning: prescribed displacements are up to {:.3g} m away from the initial ones at load parameter 0; the "
                       "first step makes up for it",

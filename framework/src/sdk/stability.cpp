@@ -9,7 +9,7 @@ namespace perikit {
 Curvature curvature_of(Problem& problem, ConstFieldView free, const StiffnessAction& K, const PreconditionerAction& precondition, int most) {
   constexpr double rounding = 1e-13;  // of the stiffness against noise: curvatures below it, as of pieces that nothing holds, are none
   Field r = problem.make_field(), w = problem.make_field(), Kw = problem.make_field(), z = precondition ? problem.make_field() : Field{};
-  fill_with_noise(free, 2, problem.body().places(), r);
+  fill_with_noise(free, 2, problem.points().places(), r);
   const double size = norm(r);
   if (!(size > 0) || !K(r, Kw)) return Curvature::unknown;
   const double stiffness = norm(Kw) / size;
