@@ -250,9 +250,9 @@ Solution KinsolSolver::solve(Equilibrium& equilibrium, bool extrapolated) {
   // KINSOL measures forces by their largest component, a fixed-point iteration by steps, here times m.
   const double unit = power_of_two(std::max(equilibrium.reference(), equilibrium.residual_norm()));   // KINSOL takes squares
   fill(1 / unit, force_scale_);
-  fill(fixed_point() ? mass_ / unit : 1 / problem.body().spacing(), displacement_scale_);
+  fill(fixed_point() ? mass_ / unit : 1 / problem.points().spacing(), displacement_scale_);
   const double free_components = std::sqrt(std::max(1.0, dot(equilibrium.free(), equilibrium.free())));
-  check(KINSetMaxNewtonStep(memory_, 1e3 * free_components * (1 + norm(u) / problem.body().spacing())), "the largest step");
+  check(KINSetMaxNewtonStep(memory_, 1e3 * free_components * (1 + norm(u) / problem.points().spacing())), "the largest step");
   check(KINSetScaledStepTol(memory_, 1e-15), "the smallest step");
   // Reactions, and with them the reference, change on the way: the target is set anew until the equilibrium itself says that it
   // is met.

@@ -66,7 +66,7 @@ bool Newton::direct(Problem& problem) const {
   // iterations grows with the root of the bulk modulus unless pressures are unknowns of their own.
   constexpr double operations_a_second = 1.6e10, seconds_a_point_2d = 1e-5, seconds_a_point_3d = 2.5e-5;
   const double bulk = mixed_pays(problem) ? 1 : std::sqrt(std::max(1.0, largest_bulk_ratio(problem) / 4));
-  const double krylov = bulk * static_cast<double>(problem.body().points()) * (problem.dimension() == 2 ? seconds_a_point_2d : seconds_a_point_3d);
+  const double krylov = bulk * static_cast<double>(problem.points().size()) * (problem.dimension() == 2 ? seconds_a_point_2d : seconds_a_point_3d);
   return predict_factor(problem, static_cast<double>(problem.assembled_size().blocks)).operations <= operations_a_second * krylov &&
          direct_solver_bytes(problem) <= memory_limit();
 }

@@ -56,7 +56,7 @@ N_Vector clone_of(N_Vector w, bool with_memory) {
   const Content& from = content(w);
   auto* own = new Content{from.problem, {}, {}};
   if (with_memory) {
-    own->owned = from.problem->body().make_field(from.view.components);
+    own->owned = from.problem->points().make_field(from.view.components);
     own->view = own->owned;
   }
   v->content = own;

@@ -37,7 +37,7 @@ class MixedSystem {
         volumes_(problem, std::move(volumes)),
         cycle_(make_companion_cycle(problem, VolumeEquations::ordinary, chosen)) {}
 
-  Field make_vector() const { return problem_.body().make_field(problem_.dimension() + 1); }
+  Field make_vector() const { return problem_.points().make_field(problem_.dimension() + 1); }
   FieldView displacement(FieldView x) const { return {x.data, x.stride, x.components - 1}; }
   FieldView pressure(FieldView x) const { return {x.component(x.components - 1), x.stride, 1}; }
 
@@ -69,7 +69,7 @@ class MixedSystem {
   VolumeEquations volumes_;
   BlockMatrix springs_;
   std::unique_ptr<Preconditioner> cycle_;
-  Field rate_ = problem_.body().make_field(1), excess_ = problem_.body().make_field(1), force_ = problem_.make_field();
+  Field rate_ = problem_.points().make_field(1), excess_ = problem_.points().make_field(1), force_ = problem_.make_field();
 };
 
 }  // namespace perikit

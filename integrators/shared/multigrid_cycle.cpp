@@ -22,10 +22,10 @@ class OneRank final : public MultigridCycle {
   Multigrid multigrid_;
 };
 
-/// The first rank has the matrix of the whole body: a solve takes the iterations that it takes on one.
+/// The first rank has the matrix of all points: a solve takes the iterations that it takes on one.
 class Gathered final : public MultigridCycle {
  public:
-  explicit Gathered(const Body& body) : first_rank_(body, body.owned()) {}
+  explicit Gathered(const Points& points) : first_rank_(points, points.owned()) {}
 
   bool make(Problem&, const BlockMatrix& K, ConstFieldView free, const std::vector<Field>& rigid, bool) override {
     const BlockMatrix whole = first_rank_.gather(K);
@@ -68,7 +68,7 @@ std::unique_ptr<MultigridCycle> make_multigrid_cycle(const Problem& problem, std
   how = "aggregation of PETSc on all ranks";
   if (std::unique_ptr<MultigridCycle> cycle = distributed(why)) return cycle;
   how = "solved by the first rank: " + why;
-  return std::make_unique<Gathered>(problem.body());
+  return std::make_unique<Gathered>(problem.points());
 }
 
 }  // namespace perikit

@@ -117,7 +117,7 @@ class CompanionCycle final : public Preconditioner {
     const bool alike = occasion == Occasion::bonds && step == step_ && first_effort() <= 1.05 * own_effort_;
     const ConstFieldView u = at.u();
     problem.assemble_companion(u, springs_, most_bulk_);
-    if (equilibrium.goes_on()) alike_ = cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.body(), u), alike);
+    if (equilibrium.goes_on()) alike_ = cycle_->make(problem, springs_, equilibrium.free(), rigid_motions(problem.points(), u), alike);
     step_ = occasion == Occasion::kept ? -1 : step;
     if (!equilibrium.stopped()) return true;
     failure = equilibrium.failure();
@@ -137,7 +137,7 @@ class CompanionCycle final : public Preconditioner {
 /// Largest over smallest shear modulus. All ranks must call it.
 double shear_contrast(const Problem& problem) {
   double largest = 0, largest_inverse = 0;
-  for (const std::int32_t p : problem.body().owned()) {
+  for (const std::int32_t p : problem.points().owned()) {
     const double mu = problem.laws().moduli(static_cast<std::size_t>(p)).mu;
     largest = std::max(largest, mu);
     if (mu > 0) largest_inverse = std::max(largest_inverse, 1 / mu);
@@ -150,8 +150,8 @@ double shear_contrast(const Problem& problem) {
 /// needs the whole body on one.
 bool factorisation_pays(Problem& problem) {
   if (problem.dimension() == 3 || communicator().size() > 1) return false;
-  const bool few = problem.body().points() <= 4000;
-  const bool resists_volume = largest_bulk_ratio(problem) > 1000 && problem.body().space() != Space::plane_stress;
+  const bool few = problem.points().size() <= 4000;
+  const bool resists_volume = largest_bulk_ratio(problem) > 1000 && problem.points().space() != Space::plane_stress;
   return (problem.dimension() == 1 || few || resists_volume) && static_cast<double>(problem.assembled_size().bytes) <= 2e9;
 }
 
@@ -213,7 +213,7 @@ void add_preconditioner_key(ParameterTable& table, bool mixed) {
 
 bool mixed_pays(Problem& problem) {
   // Measured: integrators/jfnk/README.md. Lattices need not store the rows of volumes.
-  const double least_ratio = problem.dimension() == 2 ? 200 : problem.body().lattice() ? 20 : 50;
+  const double least_ratio = problem.dimension() == 2 ? 200 : problem.points().on_lattices() ? 20 : 50;
   // Where a soft material shares evaluation points with one that is far stiffer, springs between nearest neighbours do not stand for them.
   constexpr double most_contrast = 30;
   return problem.dimension() > 1 && largest_bulk_ratio(problem) >= least_ratio && shear_contrast(problem) <= most_contrast && !factorisation_pays(problem);
@@ -221,7 +221,7 @@ bool mixed_pays(Problem& problem) {
 
 double largest_bulk_ratio(const Problem& problem) {
   double largest = 0;
-  for (const std::int32_t p : problem.body().owned()) {
+  for (const std::int32_t p : problem.points().owned()) {
     const Moduli moduli = problem.laws().moduli(static_cast<std::size_t>(p));
     if (moduli.mu > 0) largest = std::max(largest, moduli.bulk() / moduli.mu);
   }

@@ -63,27 +63,27 @@ class Dissection {
 }  // namespace
 
 FactorSize predict_factor(Problem& problem, double blocks) {
-  const Body& body = problem.body();
-  const auto d = static_cast<std::size_t>(body.dimension());
+  const Points& points = problem.points();
+  const auto d = static_cast<std::size_t>(points.dimension());
   const ConstFieldView free = problem.constraints().free();
-  const double points = dot(free, free) / static_cast<double>(d);
-  if (points == 0) return {};
+  const double free_points = dot(free, free) / static_cast<double>(d);
+  if (free_points == 0) return {};
   Box low, high, box{1, 1, 1};
   low.fill(std::numeric_limits<double>::infinity());
   high.fill(-std::numeric_limits<double>::infinity());
-  for (const std::int32_t p : body.owned()) {
-    const Point x = body.position(static_cast<std::size_t>(p));
+  for (const std::int32_t p : points.owned()) {
+    const Point x = points.position(static_cast<std::size_t>(p));
     for (std::size_t k = 0; k < d; ++k) {
       low[k] = std::min(low[k], x[k]);
       high[k] = std::max(high[k], x[k]);
     }
   }
-  for (std::size_t k = 0; k < d; ++k) box[k] = (high[k] - low[k]) / body.spacing() + 1;
+  for (std::size_t k = 0; k < d; ++k) box[k] = (high[k] - low[k]) / points.spacing() + 1;
   // Holes and held points leave fewer than the box has.
-  const double scale = std::pow(points / volume(box), 1.0 / static_cast<double>(d));
+  const double scale = std::pow(free_points / volume(box), 1.0 / static_cast<double>(d));
   for (std::size_t k = 0; k < d; ++k) box[k] = std::max(1.0, box[k] * scale);
   // The reach of rows whose balls, cut off at the sides of the box, have so many points.
-  const double of_cube = d == 1 ? 1 : d == 2 ? std::numbers::pi / 4 : std::numbers::pi / 6, wanted = blocks / static_cast<double>(body.points());
+  const double of_cube = d == 1 ? 1 : d == 2 ? std::numbers::pi / 4 : std::numbers::pi / 6, wanted = blocks / static_cast<double>(points.size());
   double least = 0, most = *std::max_element(box.begin(), box.end());
   for (int k = 0; k < 50; ++k) {
     const double reach = (least + most) / 2;
@@ -91,7 +91,7 @@ FactorSize predict_factor(Problem& problem, double blocks) {
     for (std::size_t a = 0; a < d; ++a) found *= reached(box[a], reach);
     (found * of_cube < wanted ? least : most) = reach;
   }
-  return Dissection(body.dimension(), most).of(box, {});
+  return Dissection(points.dimension(), most).of(box, {});
 }
 
 namespace {
@@ -113,10 +113,10 @@ double direct_solver_bytes(Problem& problem) {
 double krylov_solver_bytes(Problem& problem, const std::string& preconditioner, int vectors) {
   const std::string chosen = preconditioner == "auto" ? automatic_preconditioner(problem) : preconditioner;
   const auto d = static_cast<std::size_t>(problem.dimension());
-  const double field = 8.0 * static_cast<double>(problem.body().stride() * d), fields = (vectors + 10) * field;
+  const double field = 8.0 * static_cast<double>(problem.points().stride() * d), fields = (vectors + 10) * field;
   if (chosen == "factorisation") return fields + direct_solver_bytes(problem);
   if (chosen == "jacobi") return bytes_of_libraries + fields + static_cast<double>(problem.assembled_size().bytes);
-  const double points = chosen == "none" ? 0 : static_cast<double>(problem.body().points());
+  const double points = chosen == "none" ? 0 : static_cast<double>(problem.points().size());
   return bytes_of_libraries + fields + bytes_a_companion_point[d] * points;
 }
 

@@ -33,7 +33,7 @@ bool TangentAction::difference(Equilibrium& equilibrium, ConstFieldView w, Field
     fill(0.0, Kw);
     return true;
   }
-  const double eps = std::cbrt(std::numeric_limits<double>::epsilon()) * problem_.body().spacing() / largest;
+  const double eps = std::cbrt(std::numeric_limits<double>::epsilon()) * problem_.points().spacing() / largest;
   for (const double sign : {1.0, -1.0}) {
     combine(1, u_, sign * eps, w, moved_);
     const EvaluationStatus status = problem_.evaluate_forces(equilibrium.at(moved_), sign > 0 ? Kw : FieldView(force_), nullptr);

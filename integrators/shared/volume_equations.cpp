@@ -32,7 +32,7 @@ VolumeEquations::VolumeEquations(Problem& problem, std::unique_ptr<VolumetricPar
     : problem_(problem), volumes_(std::move(volumes)), R_(problem) {
   for (Field* scalar : {&W_, &inverse_W_, &active_, &row_scales_, &inverse_diagonal_, &residual_, &direction_, &product_, &first_,
                         &second_, &compliant_})
-    *scalar = problem.body().make_field(1);
+    *scalar = problem.points().make_field(1);
   for (Field* vector : {&inverse_D_, &force_, &action_, &power_}) *vector = problem.make_field();
 }
 
@@ -59,9 +59,9 @@ EvaluationStatus VolumeEquations::linearise(ConstFieldView u, const BlockMatrix&
   volumes_->squares(inverse_D_, inverse_diagonal_);
   for (Field* scalar : {&W_, &inverse_W_, &active_}) fill(0.0, *scalar);
   largest_ratio_ = 0;
-  for (const std::int32_t index : problem_.body().owned()) {
+  for (const std::int32_t index : problem_.points().owned()) {
     const auto p = static_cast<std::size_t>(index);
-    const double shear = problem_.laws().moduli(p).mu * problem_.body().volume(p);
+    const double shear = problem_.laws().moduli(p).mu * problem_.points().volume(p);
     const double excess = volumes_->stiffness().data[p] - ordinary * shear;
     if (excess <= 0) continue;
     row_scales_.data()[p] = std::sqrt(row_scales_.data()[p]) * std::max(excess / 100, std::min(excess, full_weight * shear));
@@ -178,16 +178,16 @@ void VolumeEquations::solve_schur(ConstFieldView r, FieldView p) {
 
 double VolumeEquations::largest_pressure(ConstFieldView error) const {
   double most = 0;
-  for (const std::int32_t index : problem_.body().owned()) {
+  for (const std::int32_t index : problem_.points().owned()) {
     const auto p = static_cast<std::size_t>(index);
-    const double shear = problem_.laws().moduli(p).mu * problem_.body().volume(p);
+    const double shear = problem_.laws().moduli(p).mu * problem_.points().volume(p);
     most = std::max(most, W_.data()[p] * std::abs(error.data[p]) / shear);
   }
   return communicator().largest(most);
 }
 
 std::pair<double, double> VolumeEquations::correct(ConstFieldView u, ConstFieldView growth, double enough, FieldView du) {
-  Field target = problem_.body().make_field(1), error = problem_.body().make_field(1), moved = problem_.make_field();
+  Field target = problem_.points().make_field(1), error = problem_.points().make_field(1), moved = problem_.make_field();
   combine(1, growth, 1, volumes_->logarithms(), target);
   double before = 0, last = 0;
   for (int round = 0;; ++round) {

@@ -8,7 +8,7 @@
 namespace perikit {
 
 WaveCompliance::WaveCompliance(Problem& problem) : problem_(problem) {
-  if (problem.body().part()) seen_ = problem.body().make_field(1);
+  if (problem.points().distributed()) seen_ = problem.points().make_field(1);
 }
 
 void WaveCompliance::make(const BlockMatrix& companion, ConstFieldView inverse_W) {
@@ -17,7 +17,7 @@ void WaveCompliance::make(const BlockMatrix& companion, ConstFieldView inverse_W
   const auto d = static_cast<std::size_t>(companion.dimension);
   const auto point = [&](std::size_t row) { return static_cast<std::size_t>(companion.point[row]); };
   least_.assign(companion.rows(), 0.0);
-  Field of_all = problem_.body().make_field(1), share = problem_.body().make_field(1);  // W^-1 of ghosts, too; sqrt(W_i^-1/t_i)
+  Field of_all = problem_.points().make_field(1), share = problem_.points().make_field(1);  // W^-1 of ghosts, too; sqrt(W_i^-1/t_i)
   copy(inverse_W, of_all);
   problem_.share(of_all);
   parallel_for(companion.rows(), [&](std::size_t r) {

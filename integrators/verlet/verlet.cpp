@@ -23,7 +23,7 @@ class Stepper final : private PointMotion {
  public:
   /// goes_on: the state has the loads of its last step. They act on the surface as it was before bonds failed in that step.
   Stepper(Problem& problem, bool goes_on)
-      : PointMotion(problem.body().stride()),
+      : PointMotion(problem.points().stride()),
         problem_(problem),
         state_(problem.state()),
         constraints_(problem.constraints()),

@@ -8,10 +8,10 @@
 namespace perikit {
 
 Unknowns::Unknowns(Problem& problem, const BlockMatrix& K, ConstFieldView free)
-    : number_(problem.body().make_field(1)), free_(problem.make_field()) {
-  const Body& body = problem.body();
-  std::vector<std::uint8_t> own(body.stride(), 0);
-  for (const std::int32_t p : body.owned()) own[static_cast<std::size_t>(p)] = 1;
+    : number_(problem.points().make_field(1)), free_(problem.make_field()) {
+  const Points& points = problem.points();
+  std::vector<std::uint8_t> own(points.stride(), 0);
+  for (const std::int32_t p : points.owned()) own[static_cast<std::size_t>(p)] = 1;
   copy(free, free_);
   number_.fill(-1);
   for (std::size_t r = 0; r < K.rows(); ++r) {
