@@ -77,7 +77,7 @@ std::vector<double> PointFields::vector(ConstFieldView field, bool per_volume) c
   std::vector<double> out(3 * rows_.size(), 0.0);
   for (std::size_t p = 0; p < rows_.size(); ++p) {
     const auto i = static_cast<std::size_t>(rows_[p]);
-    const double factor = per_volume ? 1.0 / problem_.body().volume(i) : 1.0;
+    const double factor = per_volume ? 1.0 / problem_.points().volume(i) : 1.0;
     for (int c = 0; c < field.components && field.data; ++c)
       out[3 * p + static_cast<std::size_t>(c)] = factor * field.component(c)[i];
   }
@@ -119,7 +119,7 @@ void PointFields::expect(std::span<const std::string> names) {
 
 const OutputField& PointFields::get(const std::string& name) {
   if (const auto known = cache_.find(name); known != cache_.end()) return known->second;
-  return cache_[name] = at(name, problem_.body().owned());
+  return cache_[name] = at(name, problem_.points().owned());
 }
 
 OutputField PointFields::at(const std::string& name, std::span<const std::int32_t> points) {

@@ -24,7 +24,7 @@ class EarlierRun {
       : scene_(scene),
         problem_(problem),
         folder_(results_folder(*scene.initial_from)),
-        frame_(*scene.initial_from, problem.body().points_of_all_ranks()) {}
+        frame_(*scene.initial_from, problem.points().size_on_all_ranks()) {}
 
   std::string carry() {
     std::string taken;
@@ -81,11 +81,11 @@ class EarlierRun {
   }
 
   bool same_points() const {
-    const Body& body = problem_.body();
+    const Points& points = problem_.points();
     bool same = true;
     hdf5::Source(folder_ / "reference.h5")
-        .each_row("position", body.numbers(body.owned()), [&](std::size_t k, std::span<const double> there) {
-          const Point x = body.position(static_cast<std::size_t>(body.owned()[k]));
+        .each_row("position", points.numbers(points.owned()), [&](std::size_t k, std::span<const double> there) {
+          const Point x = points.position(static_cast<std::size_t>(points.owned()[k]));
           same = same && std::ranges::equal(x, there);
         });
     return same;
@@ -101,11 +101,11 @@ class EarlierRun {
       return;
     }
     const Field damage = problem_.terms().damage();
-    const Body& body = problem_.body();
-    frame_.each_row("damage", body.numbers(body.owned()), [&](std::size_t k, std::span<const double> there) {
-      const std::int32_t p = body.owned()[k];
+    const Points& points = problem_.points();
+    frame_.each_row("damage", points.numbers(points.owned()), [&](std::size_t k, std::span<const double> there) {
+      const std::int32_t p = points.owned()[k];
       if (there[0] <= damage.data()[p] + 1e-9) return;
-      const Point x = body.position(static_cast<std::size_t>(p));
+      const Point x = points.position(static_cast<std::size_t>(p));
       refuse(fmt::format("results of a run in which bonds were cut or had failed that are whole in this scene, at the point "
                          "({:.6g}, {:.6g}, {:.6g}) for one",
                          x[0], x[1], x[2]),

@@ -42,13 +42,13 @@ double rounding_energy(BodyProblem& problem, double time_step) {
 double rounding_work(BodyProblem& problem) {
   double largest = 0;
   ExactSum stiffness;
-  const Body& body = problem.body();
+  const Points& points = problem.points();
   const ConstFieldView u = problem.state().displacement();
   for (std::size_t k = 0; k < u.size(); ++k) largest = std::max(largest, std::abs(u.data[k]));
-  for (const std::int32_t point : body.owned()) {
+  for (const std::int32_t point : points.owned()) {
     const auto p = static_cast<std::size_t>(point);
     const Moduli moduli = problem.laws().moduli(p);
-    stiffness.add((moduli.lambda + 2 * moduli.mu) * body.volume(p) / (body.spacing() * body.spacing()));
+    stiffness.add((moduli.lambda + 2 * moduli.mu) * points.volume(p) / (points.spacing() * points.spacing()));
   }
   const double motion = communicator().largest(largest);
   return 16 * std::numeric_limits<double>::epsilon() * total_over_ranks(stiffness) * motion * motion;

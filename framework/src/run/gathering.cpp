@@ -29,10 +29,10 @@ std::vector<double> in_order(const std::vector<std::int64_t>& numbers, std::span
 
 void gather_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width,
                    const std::function<void(std::size_t first, std::span<const double> rows)>& use) {
-  const Body& body = problem.body();
-  if (!problem.partition()) return use(0, mine);
-  const std::vector<std::int64_t> numbers = body.numbers(body.owned());
-  const std::size_t all = body.points_of_all_ranks();
+  const Points& points = problem.points();
+  if (!points.distributed()) return use(0, mine);
+  const std::vector<std::int64_t> numbers = points.numbers(points.owned());
+  const std::size_t all = points.size_on_all_ranks();
   for (std::size_t first = 0; first < all; first += rows_of_piece) {
     const std::vector<double> rows =
         gather_piece(numbers, first, std::min(rows_of_piece, all - first), width,
@@ -51,9 +51,8 @@ std::size_t most_points_gathered() {
 
 void share_points(const BodyProblem& problem, std::span<const double> mine, std::size_t width,
                   const std::function<void(std::size_t first, std::span<const double> rows)>& use) {
-  const Body& body = problem.body();
-  const std::vector<std::int64_t> numbers = body.numbers(body.owned());
-  const std::size_t all = body.points_of_all_ranks(), piece = std::clamp<std::size_t>(most_points_gathered(), 1, rows_of_piece);
+  const std::vector<std::int64_t> numbers = problem.points().numbers(problem.points().owned());
+  const std::size_t all = problem.points().size_on_all_ranks(), piece = std::clamp<std::size_t>(most_points_gathered(), 1, rows_of_piece);
   const auto ranks = static_cast<std::size_t>(communicator().size());
   const auto points = [&](std::size_t first) { return first < all ? std::min(piece, all - first) : 0; };
   std::vector<double> rows;
@@ -90,7 +89,7 @@ std::vector<double> gather_rows(const Body& body, std::size_t first, std::size_t
 
 void gather_set(const BodyProblem& problem, const std::string& set, std::span<const double> mine, std::size_t width,
                 const std::function<void(std::span<const double> rows)>& use) {
-  if (!problem.partition()) return use(mine);
+  if (!problem.points().distributed()) return use(mine);
   if (set == "all") return gather_points(problem, mine, width, [&](std::size_t, std::span<const double> rows) { use(rows); });
   const Body& body = problem.body();
   const std::vector<std::int64_t> own = body.numbers(body.set(set));

@@ -93,14 +93,14 @@ std::string of_masses(const Scene& scene, BodyProblem& problem) {
 /// The sum of all loads and their moment about the origin; loads of which one component alone varies are as good as others there.
 std::string of_loads(const Scene& scene, BodyProblem& problem, double end) {
   if (scene.loads.empty()) return {};
-  const Body& body = problem.body();
-  const int d = body.dimension();
+  const Points& points = problem.points();
+  const int d = points.dimension();
   Field force = problem.make_field();
   if (!problem.external_forces({problem.state().displacement(), end}, force).ok()) return {};
   Vector sum{}, moment{};
   double largest = 0;
-  for (const std::int32_t index : body.owned()) {
-    const Point x = body.position(static_cast<std::size_t>(index));
+  for (const std::int32_t index : points.owned()) {
+    const Point x = points.position(static_cast<std::size_t>(index));
     Vector f{};
     for (int a = 0; a < d; ++a) f[static_cast<std::size_t>(a)] = force.component(a)[index];
     for (std::size_t a = 0; a < 3; ++a) {
@@ -109,7 +109,7 @@ std::string of_loads(const Scene& scene, BodyProblem& problem, double end) {
       largest += std::abs(f[a]);
     }
   }
-  const double length = body.spacing() * std::cbrt(static_cast<double>(body.owned().size()));
+  const double length = points.spacing() * std::cbrt(static_cast<double>(points.owned().size()));
   for (std::size_t a = 0; a < 3; ++a) {   // rounding of what cancels
     if (std::abs(sum[a]) < 1e-12 * largest) sum[a] = 0;
     if (std::abs(moment[a]) < 1e-12 * largest * length) moment[a] = 0;

@@ -35,15 +35,15 @@ std::vector<double> roles_of(const Scene& scene, const Body& body) {
 /// a face, have none.
 std::vector<BodyArrow> arrows_of(BodyProblem& problem, double end, double longest) {
   constexpr std::size_t most = 60;
-  const Body& body = problem.body();
+  const Points& points = problem.points();
   Field force = problem.make_field();
   if (!problem.external_forces({problem.state().displacement(), end}, force).ok()) return {};
   std::vector<BodyArrow> arrows;
   double largest = 0;
-  for (const std::int32_t index : body.owned()) {
-    BodyArrow arrow{body.position(static_cast<std::size_t>(index)), {}};
+  for (const std::int32_t index : points.owned()) {
+    BodyArrow arrow{points.position(static_cast<std::size_t>(index)), {}};
     double square = 0;
-    for (int a = 0; a < body.dimension(); ++a) {
+    for (int a = 0; a < points.dimension(); ++a) {
       arrow.along[static_cast<std::size_t>(a)] = force.component(a)[index];
       square += std::pow(force.component(a)[index], 2);
     }

@@ -110,7 +110,7 @@ RunRecorder::RunRecorder(Simulation& simulation, std::filesystem::path folder, b
   reference.use([&](const ReferenceData& data) {
     writer_ = std::make_unique<FrameWriter>(folder_, data, RunAttributes{PERIKIT_VERSION, scene.title, scene.text}, done_.frames);
   });
-  shares_frames_ = simulation.problem().partition() && simulation.problem().body().points_of_all_ranks() > most_points_gathered();
+  shares_frames_ = simulation.problem().partition() && simulation.problem().points().size_on_all_ranks() > most_points_gathered();
   if (!first_) return;
   std::vector<std::string> missing;
   for (const HistoryDescription& record : scene.output.history)
@@ -461,7 +461,7 @@ void RunRecorder::progress(const StepReport& report) {
                      report.residual, left), end);
     return;
   }
-  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().body().points_of_all_ranks()) / std::max(spent, 1e-9);
+  const double rate = static_cast<double>(report.step - first_step_) * static_cast<double>(simulation_.problem().points().size_on_all_ranks()) / std::max(spent, 1e-9);
   show(fmt::format("step {}  time {:.4g}/{:.4g}  dt {:.3g}  {:.3g} points/s  {:.0f} s left", report.step, report.time, report.end_time, report.time_step, rate, left), end);
 }
 

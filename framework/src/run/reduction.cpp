@@ -26,7 +26,7 @@ bool takes_places(const std::string& reduce) { return reduce == "fit" || reduce 
 /// (y - about) x force, y being where the point is.
 double moment_of(const HistoryDescription& record, BodyProblem& problem, std::size_t p, const double* force) {
   const ConstFieldView u = problem.state().displacement();
-  Point arm = problem.body().position(p);
+  Point arm = problem.points().position(p);
   for (std::size_t c = 0; c < 3; ++c) arm[c] += (static_cast<int>(c) < u.components ? u.component(static_cast<int>(c))[p] : 0.0) - record.about[c];
   const std::size_t axis = static_cast<std::size_t>(record.component[0] - 'x'), a = (axis + 1) % 3, b = (axis + 2) % 3;
   return arm[a] * force[b] - arm[b] * force[a];

@@ -136,7 +136,7 @@ std::vector<std::string> said_by_all(const std::vector<std::string>& lines) {
 std::string ranks_summary(const BodyProblem& problem) {
   const Partition& partition = *problem.partition();
   const std::vector<std::int64_t>& points = partition.points();
-  const double mean = static_cast<double>(problem.body().points_of_all_ranks()) / static_cast<double>(points.size());
+  const double mean = static_cast<double>(problem.points().size_on_all_ranks()) / static_cast<double>(points.size());
   const auto ghosts = static_cast<double>(problem.ghosts()->size());
   const auto bytes = static_cast<double>(problem.bytes());
   const double most_ghosts = communicator().largest(ghosts), most_bytes = communicator().largest(bytes);
@@ -217,7 +217,7 @@ std::string Simulation::explanation(const Registry& registry) const {
                        fmt::format("the blocks of {} points, less those in reach of others", held)});
     }
   }
-  if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->body().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
+  if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->points().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
   if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
   const std::size_t fields = point_fields().size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);
