@@ -149,14 +149,14 @@ void measure(Registry& registry, Row& row, const std::string& kinematics, const 
     Problem& problem = simulation.problem();
     StepTimer timer;
     simulation.run(timer);
-    row.points = problem.body().points();
+    row.points = problem.points().size();
     const auto points = static_cast<double>(row.points);
     row.bytes = static_cast<double>(simulation.problem().bytes()) / points;
     row.step = std::min(row.step, timer.best() / points);
     if (counts_operations) row.operations = static_cast<double>(timer.operations()) / points;
     if (!all) return;
     row.set_up /= points;
-    Field w = problem.body().make_field(row.dimension), Kw = problem.body().make_field(row.dimension);
+    Field w = problem.points().make_field(row.dimension), Kw = problem.points().make_field(row.dimension);
     std::copy_n(problem.state().displacement().data, w.components() * w.stride(), w.data());
     const auto check = [](const EvaluationStatus& status) {
       if (!status.ok()) throw RunError(fmt::format("bench: {}", status.description));
@@ -242,7 +242,7 @@ void print_head(const Row& row) {
 void model_threads(Registry& registry, Row& row, const std::string& kinematics, const std::string& material, const BenchOptions& options) {
   const Scene scene = parse_scene(scene_of(row, kinematics, material, options.cells, 12), "bench.toml", registry);
   Simulation simulation(scene, registry);
-  row.points = simulation.problem().body().points();
+  row.points = simulation.problem().points().size();
   ThreadsModel model;
   simulation.run(model);
   print_head(row);

@@ -141,8 +141,8 @@ void run(const Options& options) {
 std::string time_of_forces(Simulation& simulation) {
   BodyProblem& problem = simulation.problem();
   Field force = problem.make_field(), u = problem.make_field();
-  for (const std::int32_t p : problem.body().owned())
-    for (int a = 0; a < problem.dimension(); ++a) u.component(a)[p] = 1e-9 * problem.body().spacing() * static_cast<double>((p + a) % 7 - 3);
+  for (const std::int32_t p : problem.points().owned())
+    for (int a = 0; a < problem.dimension(); ++a) u.component(a)[p] = 1e-9 * problem.points().spacing() * static_cast<double>((p + a) % 7 - 3);
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k) {
     const auto start = std::chrono::steady_clock::now();

@@ -107,12 +107,12 @@ std::string scene_text(const Case& c) {
 Values evaluate(const Case& c, Registry& registry) {
   Simulation simulation(parse_scene(scene_text(c), "machine_check.toml", registry), registry);
   BodyProblem& problem = simulation.problem();
-  const Body& body = problem.body();
+  const Points& points = problem.points();
   const auto each_component = [&](auto&& use) {
-    for (const std::int32_t p : body.internal())
-      for (int a = 0; a < c.dimension; ++a) use(body.position(static_cast<std::size_t>(p)), p, a);
+    for (const std::int32_t p : points.live())
+      for (int a = 0; a < c.dimension; ++a) use(points.position(static_cast<std::size_t>(p)), p, a);
   };
-  Field u = body.make_field(c.dimension), force = body.make_field(c.dimension);
+  Field u = points.make_field(c.dimension), force = points.make_field(c.dimension);
   each_component([&](const Point& x, std::int32_t p, int a) {
     u.view().component(a)[p] = 0.03 * x[static_cast<std::size_t>((a + 1) % c.dimension)] + 0.05 * std::sin(1.3 * x[0] + 1.7 * x[1] + 0.9 * x[2] + a);
   });
