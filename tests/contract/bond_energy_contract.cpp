@@ -101,17 +101,17 @@ TEST_CASE("kinematics: bonds share the stored energy, and those that hold the mo
 }
 
 TEST_CASE("kinematics: what a bond sets free is the derivative of the stored energy by its integrity, and bonds fail by it, screened or not") {
-  enum class Points { lattice, cloud, consistent_cloud };
+  enum class PointSet { lattice, cloud, consistent_cloud };
   for (const Example& example : kinematics_examples())
-    for (const Points points : {Points::lattice, Points::cloud, Points::consistent_cloud})
+    for (const PointSet points : {PointSet::lattice, PointSet::cloud, PointSet::consistent_cloud})
       for (const int d : {1, 2, 3}) {
-        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", points == Points::lattice ? "lattice" : "cloud",
-             points == Points::consistent_cloud ? ", consistent" : "");
+        INFO(example.part, " (", example.table, example.stabilization, "), ", d, "D ", points == PointSet::lattice ? "lattice" : "cloud",
+             points == PointSet::consistent_cloud ? ", consistent" : "");
         if (!bonds_may_fail(example, d) || formulation_of(example).force_state == ForceState::local) continue;
         const Formulation formulation = formulation_of(example);
         // Of these no consistent form is known.
-        if (points == Points::consistent_cloud && (formulation.pairs || formulation.order > 1 || (formulation.selective() && !formulation.bond))) continue;
-        BodyOptions options{.dimension = d, .cloud = points != Points::lattice, .consistent = points == Points::consistent_cloud};
+        if (points == PointSet::consistent_cloud && (formulation.pairs || formulation.order > 1 || (formulation.selective() && !formulation.bond))) continue;
+        BodyOptions options{.dimension = d, .cloud = points != PointSet::lattice, .consistent = points == PointSet::consistent_cloud};
         const char* const weakening =
             "[damage]\ntype = \"critical_energy\"\nsecond_law = false\nenergy = \"{}\"\nsoftening = {}\nenergy_release_rate = "
             "{:.17g}\n";

@@ -59,9 +59,9 @@ void for_every_example(Check&& check) {
 }
 
 /// The term of an example at some points; one number each for components of positions, displacements, velocities, directions.
-class Points {
+class LawPoints {
  public:
-  Points(const Example& example, int dimension, std::size_t n, std::uint64_t seed)
+  LawPoints(const Example& example, int dimension, std::size_t n, std::uint64_t seed)
       : scene_(parse_scene(with_term(example, soft(dimension, false)), "contract.toml", subject().registry)),
         part_(point_term_parts(scene_, subject().registry, explicit_runs).front()),
         traits(part_.term->traits()),
@@ -141,8 +141,8 @@ class Points {
 };
 
 /// u + h w of all points.
-Points moved(const Points& points, double h) {
-  Points other = points;
+LawPoints moved(const LawPoints& points, double h) {
+  LawPoints other = points;
   for (std::size_t k = 0; k < other.u.size(); ++k) other.u[k] += h * points.w[k];
   return other;
 }
@@ -153,14 +153,14 @@ double slope(Value&& value, double h) {
   return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h);
 }
 
-double largest_of(const AlignedVector<double>& values, const Points& points) {
+double largest_of(const AlignedVector<double>& values, const LawPoints& points) {
   double most = 0;
   for (std::size_t c = 0; c < values.size() / points.stride(); ++c)
     for (std::size_t p = 0; p < points.points(); ++p) most = std::max(most, std::abs(values[c * points.stride() + p]));
   return most;
 }
 
-bool finite(const Points::Outputs& out, const Points& points) {
+bool finite(const LawPoints::Outputs& out, const LawPoints& points) {
   for (const auto* values : {&out.energy, &out.force, &out.dforce})
     for (std::size_t c = 0; c < values->size() / points.stride(); ++c)
       for (std::size_t p = 0; p < points.points(); ++p)
@@ -188,11 +188,11 @@ std::string waves(const Example& example, int d, bool cloud, int steps, int cell
 TEST_CASE("term: force = -de/du where it is conservative, tangent = df/du") {
   constexpr double h = 1e-3, tolerance = 1e-7;
   for_every_example([&](const Example& example, int d) {
-    const Points points(example, d, 40, 11);
-    const Points::Outputs out = points.evaluate();
+    const LawPoints points(example, d, 40, 11);
+    const LawPoints::Outputs out = points.evaluate();
     REQUIRE(out.status.ok());
     REQUIRE_MESSAGE(finite(out, points), "an output is not finite");
-    std::map<double, Points::Outputs> at;
+    std::map<double, LawPoints::Outputs> at;
     for (const double s : {-2 * h, -h, h, 2 * h}) at[s] = moved(points, s).evaluate();
     const double scale = std::max({largest_of(out.force, points), largest_of(out.dforce, points), largest_of(out.energy, points)});
     for (std::size_t p = 0; p < points.points(); ++p) {
@@ -212,13 +212,13 @@ TEST_CASE("term: force = -de/du where it is conservative, tangent = df/du") {
 TEST_CASE("term: a batch is its points one at a time, writes all of its outputs and nothing else") {
   for_every_example([](const Example& example, int d) {
     for (const std::size_t n : {1, 5, 8, 13, 128}) {
-      const Points points(example, d, n, 12);
-      const Points::Outputs out = points.evaluate();
+      const LawPoints points(example, d, n, 12);
+      const LawPoints::Outputs out = points.evaluate();
       REQUIRE(out.status.ok());
       CHECK_MESSAGE(finite(out, points), "an output of ", n, " points is not written");
       bool same = true, beyond = false;
       for (std::size_t p = 0; p < n; ++p) {
-        const Points::Outputs one = points.evaluate(p, 1);
+        const LawPoints::Outputs one = points.evaluate(p, 1);
         same = same && one.energy[0] == out.energy[p];
         for (std::size_t c = 0; c < static_cast<std::size_t>(d); ++c)
           same = same && one.force[c * points.stride()] == out.force[c * points.stride() + p] && one.dforce[c * points.stride()] == out.dforce[c * points.stride() + p];
@@ -234,9 +234,9 @@ TEST_CASE("term: a batch is its points one at a time, writes all of its outputs 
 
 TEST_CASE("term: what is not finite is inadmissible, and named") {
   for_every_example([](const Example& example, int d) {
-    Points points(example, d, 20, 13);
+    LawPoints points(example, d, 20, 13);
     points.u[6] = poison;
-    const Points::Outputs out = points.evaluate();
+    const LawPoints::Outputs out = points.evaluate();
     const bool told = std::isfinite(out.energy[6]) && std::isfinite(out.force[6]) && std::isfinite(out.dforce[6]);
     CHECK_MESSAGE((out.status.inadmissible == 6 || (told && out.status.ok())), "the displacement of point 6 is no number, and ", out.status.inadmissible, " is inadmissible");
   });
@@ -244,20 +244,20 @@ TEST_CASE("term: what is not finite is inadmissible, and named") {
 
 TEST_CASE("term: traits are true") {
   for_every_example([](const Example& example, int d) {
-    const Points points(example, d, 40, 14);
-    const Points::Outputs out = points.evaluate();
+    const LawPoints points(example, d, 40, 14);
+    const LawPoints::Outputs out = points.evaluate();
     REQUIRE(out.status.ok());
     if (points.traits.constant_tangent) {
-      const Points::Outputs there = moved(points, 0.7).evaluate();
+      const LawPoints::Outputs there = moved(points, 0.7).evaluate();
       double worst = 0;
       for (std::size_t c = 0; c < static_cast<std::size_t>(d); ++c)
         for (std::size_t p = 0; p < points.points(); ++p) worst = std::max(worst, std::abs(there.dforce[c * points.stride() + p] - out.dforce[c * points.stride() + p]));
       CHECK_MESSAGE(worst <= 1e-12 * largest_of(out.dforce, points), "traits.constant_tangent: the tangent changes by ", worst);
     }
     if (!points.depends_on_time()) {
-      Points later = points;
+      LawPoints later = points;
       later.renew(points.time + 1);
-      const Points::Outputs then = later.evaluate();
+      const LawPoints::Outputs then = later.evaluate();
       bool same = true;
       for (std::size_t p = 0; p < points.points(); ++p) same = same && then.energy[p] == out.energy[p] && then.force[p] == out.force[p];
       CHECK_MESSAGE(same, "without traits.time it depends on the time");
@@ -266,9 +266,9 @@ TEST_CASE("term: traits are true") {
     CHECK_MESSAGE((!points.traits.velocity || !points.traits.conservative), "a force that depends on the velocity has no energy");
     if (points.traits.dissipates) {
       // What the force takes out of a motion with velocity v and the energy does not take up.
-      Points along = points;
+      LawPoints along = points;
       along.w = points.v;
-      std::map<double, Points::Outputs> at;
+      std::map<double, LawPoints::Outputs> at;
       constexpr double h = 1e-3;
       for (const double s : {-2 * h, -h, h, 2 * h}) at[s] = moved(along, s).evaluate();
       const double scale = largest_of(out.force, points) + largest_of(out.energy, points);

@@ -11,7 +11,7 @@ using namespace perikit;
 
 namespace {
 
-class Points final : public PointKinematics {
+class PointSet final : public PointKinematics {
  public:
   int order() const noexcept override { return 2; }
 };
@@ -164,7 +164,7 @@ void add(Registrar& registrar, const char* name) {
 }  // namespace
 
 PERIKIT_PLUGIN(registrar) {
-  add<Points>(registrar, "their_points");
+  add<PointSet>(registrar, "their_points");
   add<Bonds>(registrar, "their_bonds");
   add<Blend>(registrar, "their_blend");
   add_rubber<TextbookRubber>(registrar, "their_rubber");

@@ -12,7 +12,7 @@ using namespace perikit::test;
 
 namespace {
 
-class Points : public PointKinematics {
+class PointSet : public PointKinematics {
  public:
   int order() const noexcept override { return 3; }
 };
@@ -62,7 +62,7 @@ class Mapped final : public MappedKinematics {
 };
 
 class Unclassed final : public Kinematics {};
-class PointsAndPairs final : public Points, public Pairs {};
+class PointsAndPairs final : public PointSet, public Pairs {};
 
 std::string refusal(std::shared_ptr<const Kinematics> kinematics) {
   return message_of<std::invalid_argument>([&] { make_formulation(std::move(kinematics)); });
@@ -73,7 +73,7 @@ int classes(const Formulation& f) { return !!f.point + !!f.bond + !!f.weighted +
 }  // namespace
 
 TEST_CASE("formulation: each class of kinematics is known by what it states") {
-  const Formulation points = make_formulation(std::make_shared<Points>()), bonds = make_formulation(std::make_shared<Bonds>());
+  const Formulation points = make_formulation(std::make_shared<PointSet>()), bonds = make_formulation(std::make_shared<Bonds>());
   const Formulation parts = make_formulation(std::make_shared<Parts>()), pairs = make_formulation(std::make_shared<Pairs>());
   for (const Formulation* f : {&points, &bonds, &parts, &pairs}) {
     CHECK(classes(*f) == 1);
@@ -117,9 +117,9 @@ TEST_CASE("formulation: what is none of the classes, or several, and maps over a
   const std::string classes = " PointKinematics, BondKinematics, WeightedKinematics, PairKinematics and MappedKinematics";
   CHECK(refusal(std::make_shared<Unclassed>()) == "it is none of" + classes);
   const auto both = std::make_shared<PointsAndPairs>();
-  CHECK(refusal(std::shared_ptr<const Kinematics>(both, static_cast<const Points*>(both.get()))) == "it is several of" + classes);
+  CHECK(refusal(std::shared_ptr<const Kinematics>(both, static_cast<const PointSet*>(both.get()))) == "it is several of" + classes);
   const std::string bad_base = "the base that it maps is neither a BondKinematics nor a WeightedKinematics";
-  CHECK(refusal(std::make_shared<Mapped<Points>>()) == bad_base);
+  CHECK(refusal(std::make_shared<Mapped<PointSet>>()) == bad_base);
   CHECK(refusal(std::make_shared<Mapped<Pairs>>()) == bad_base);
   CHECK(refusal(std::make_shared<Mapped<Unclassed>>()) == bad_base);
   CHECK(refusal(std::make_shared<Mapped<Mapped<Bonds>>>()) == bad_base);

@@ -330,9 +330,9 @@ TEST_CASE("a line for each combination of the series, and over a key of all othe
 }
 
 TEST_CASE("where a series stays below a level: the last point above it counts, straight lines (of logarithms) lie between points") {
-  using Points = std::vector<std::pair<double, double>>;
+  using PointSet = std::vector<std::pair<double, double>>;
   using enum Crossing::Kind;
-  const auto found = [](Points points, bool logarithmic) { return crossing(std::move(points), 0.01, logarithmic); };
+  const auto found = [](PointSet points, bool logarithmic) { return crossing(std::move(points), 0.01, logarithmic); };
   CHECK(found({{1, 0.1}, {10, 0.001}}, true).x == doctest::Approx(std::sqrt(10.0)).epsilon(1e-12));
   CHECK(found({{10, 0.0}, {1, 0.02}}, false).x == doctest::Approx(5.5).epsilon(1e-12));
   // An error that passes through zero on its way is not small for good.

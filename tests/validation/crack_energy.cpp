@@ -32,9 +32,9 @@ const std::vector<Kernel> kernels{{"\"constant\"", [](double) { return 1.0; }},
                                   {"\"cubic_spline\"", [](double r) { return r <= 0.5 ? 1 - 6 * r * r * (1 - r) : 2 * std::pow(1 - r, 3); }},
                                   {"{ type = \"expression\", formula = \"5*exp(-r^2)\" }", [](double r) { return 5 * std::exp(-r * r); }}};
 
-enum class Points { lattice, cloud };
+enum class CrackPoints { lattice, cloud };
 
-std::string scene(int dimension, Points points, const std::string& kinematics, const Kernel& kernel, const std::string& limit, bool interface) {
+std::string scene(int dimension, CrackPoints points, const std::string& kinematics, const Kernel& kernel, const std::string& limit, bool interface) {
   const double width = dimension == 3 ? 1.2 : 2.4;
   std::string rim;
   for (int a = 0; a < dimension; ++a) rim += fmt::format("{0}{1} < 0.35 || {1} > {2}", a > 0 ? " || " : "", "xyz"[a], width - 0.35);
@@ -46,14 +46,14 @@ std::string scene(int dimension, Points points, const std::string& kinematics, c
   further += fmt::format("[damage]\ntype = \"critical_energy\"\nenergy_release_rate = {}\nlimit = \"{}\"\nno_fail = [\"rim\"]\n", interface ? 1e6 : Gc, limit);
   // Balanced clouds have other weights near their surfaces.
   return test::SceneText{.dimension = dimension, .spacing = spacing, .upper = std::vector<double>(static_cast<std::size_t>(dimension), width),
-                         .lattice = fmt::format("jitter = {}", points == Points::cloud ? 1e-9 : 0.0), .sets = fmt::format("upper = \"x > {}\"\nrim = \"{}\"", width / 2, rim),
-                         .family = fmt::format("horizon_ratio = {}\ninfluence = {}\n{}", m, kernel.table, points == Points::cloud ? "consistent = false" : ""), .kinematics = kinematics,
+                         .lattice = fmt::format("jitter = {}", points == CrackPoints::cloud ? 1e-9 : 0.0), .sets = fmt::format("upper = \"x > {}\"\nrim = \"{}\"", width / 2, rim),
+                         .family = fmt::format("horizon_ratio = {}\ninfluence = {}\n{}", m, kernel.table, points == CrackPoints::cloud ? "consistent = false" : ""), .kinematics = kinematics,
                          .material = "type = \"linear_elastic\"\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.25",
                          .further = further + "[[boundary]]\nset = \"all\"\ndisplacement = " + test::vector_text(dimension, 0, 0, 0), .integrator = "type = \"newton\"\nsteps = 1"};
 }
 
 /// Strain at which the first bonds hold their part of Gc: 2 W/m0 omega = Gc omega/S, W = (2 lambda + 2 mu) e^2 in plane strain.
-double first_strain(int dimension, Points points, const Kernel& kernel, const std::string& limit) {
+double first_strain(int dimension, CrackPoints points, const Kernel& kernel, const std::string& limit) {
   double m0 = 0, along = 0, plain = 0, mean = 0, mean_plain = 0, largest = 0;
   const int reach = static_cast<int>(m), ry = dimension > 1 ? reach : 0, rz = dimension > 2 ? reach : 0;
   for (int z = -rz; z <= rz; ++z)
@@ -70,7 +70,7 @@ double first_strain(int dimension, Points points, const Kernel& kernel, const st
         mean_plain += length * spacing * volume;
       }
   const double of_mean = dimension == 3 ? 0.25 : dimension == 2 ? 1 / std::numbers::pi : 0.5;
-  const bool cloud = points == Points::cloud;
+  const bool cloud = points == CrackPoints::cloud;
   const double crossing = limit == "shared" ? (cloud ? of_mean * mean : along) : (cloud ? of_mean * mean_plain : plain) * largest;
   const double energy = dimension == 3 ? 7.5 * lame : dimension == 2 ? 4 * lame : 1.5 * lame;
   return std::sqrt(Gc * m0 / (2 * energy * crossing));
@@ -87,12 +87,12 @@ bool fails_at(Simulation& simulation, double strain) {
 TEST_CASE("critical_energy: the first bonds of an expanded body fail at Gc, with every influence function") {
   for (const char* const kinematics : {"type = \"baqp\"", "type = \"projection\"", "type = \"conventional\"\nstabilization = \"wan\""})
     for (int d = 1; d <= 3; ++d)
-      for (const Points points : {Points::lattice, Points::cloud})
+      for (const CrackPoints points : {CrackPoints::lattice, CrackPoints::cloud})
         for (const std::string limit : {"shared", "equal"})
           for (const bool interface : {false, true})
             for (const Kernel& kernel : kernels) {
-              if (d == 3 && (interface || points == Points::cloud)) continue;
-              INFO(fmt::format("{}, {}D, {}, {}, {}{}", kinematics, d, points == Points::cloud ? "cloud" : "lattice", limit, kernel.table, interface ? ", interface" : ""));
+              if (d == 3 && (interface || points == CrackPoints::cloud)) continue;
+              INFO(fmt::format("{}, {}D, {}, {}, {}{}", kinematics, d, points == CrackPoints::cloud ? "cloud" : "lattice", limit, kernel.table, interface ? ", interface" : ""));
               // Bonds of `projection` have equal parts of the energy.
               const bool equal_parts = std::string(kinematics).find("projection") != std::string::npos;
               const double strain = first_strain(d, points, equal_parts ? kernels[0] : kernel, limit);

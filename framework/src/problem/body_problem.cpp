@@ -6,34 +6,19 @@
 #include <limits>
 
 #include "core/fingerprint.hpp"
-#include "core/ranks/dependent_arrival.hpp"
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "problem/companion.hpp"
 #include "problem/crossed_faces.hpp"
-#include "problem/history_record.hpp"
-#include "problem/image_gradients.hpp"
+#include "problem/surroundings/image_gradients.hpp"
 #include "problem/loose/loose_points.hpp"
 #include "problem/loose/weak_springs.hpp"
 #include "problem/near_bonds.hpp"
-#include "problem/snapshot.hpp"
 
 namespace perikit {
 
 namespace {
-
-/// Images follow their sources, some of which are ghosts.
-class Extension final : public DependentArrival {
- public:
-  Extension(Arrival& ghosts, const ImageMap& images, FieldView u) : DependentArrival(&ghosts), images_(images), u_(u) {}
-
- private:
-  void put() override { images_.extend(u_); }
-
-  const ImageMap& images_;
-  FieldView u_;
-};
 
 void refuse_ranks(const ProblemParts& parts) {
   if (parts.partition)
@@ -44,9 +29,13 @@ void refuse_ranks(const ProblemParts& parts) {
 }  // namespace
 
 BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
-    : Problem(values_), parts_(std::move(parts)), values_(std::move(values)), driven_work_(*parts_.terms, values_.state) {
-  if (parts_.partition) ghosts_.emplace(*parts_.partition, dimension());
-  if (parts_.images) seen_ = make_field();
+    : Problem(values_),
+      parts_(std::move(parts)),
+      values_(std::move(values)),
+      driven_work_(*parts_.terms, values_.state),
+      surroundings_(parts_.partition.get(), parts_.images.get(), values_.points.dimension()),
+      world_({{"body", parts_.terms.get()}}),
+      saved_state_(values_.points, values_.constraints, parts_.fracture, *parts_.terms, values_.state) {
   driven_work_.begin({state().displacement(), state().time, 0, terms().driven_by_velocity() ? state().velocity() : FieldView{}});
 }
 
@@ -55,69 +44,6 @@ BodyProblem::~BodyProblem() = default;
 ProblemParts::ProblemParts() = default;
 ProblemParts::ProblemParts(ProblemParts&&) noexcept = default;
 ProblemParts::~ProblemParts() = default;
-
-namespace {
-
-/// A failure on one rank is one on all of them, which must say the same: that of the point that comes first.
-void agree(EvaluationStatus& status) {
-  if (communicator().size() == 1 || communicator().largest(status.ok() ? 0.0 : 1.0) == 0) return;
-  std::vector<std::byte> mine;
-  if (!status.ok()) {
-    ByteWriter out;
-    out.value(status.point);
-    out.bytes(status.description.data(), status.description.size());
-    mine = out.take();
-  }
-  std::vector<std::byte> first;
-  std::int64_t least = -1;
-  for (const std::vector<std::byte>& of_rank : communicator().gather(mine)) {
-    if (of_rank.empty()) continue;
-    const auto point = ByteReader(of_rank).value<std::int64_t>();
-    if (least >= 0 && point >= least) continue;
-    least = point;
-    first = of_rank;
-  }
-  communicator().broadcast(first);
-  ByteReader in(first);
-  status.point = in.value<std::int64_t>();
-  status.description.assign(first.size() - sizeof status.point, ' ');
-  in.bytes(status.description.data(), status.description.size());
-}
-
-}  // namespace
-
-BodyProblem::Seen BodyProblem::seen(ConstFieldView u, Field& memory) {
-  if (images()) {
-    copy(u, memory);
-    if (ghosts_) ghosts_->forward(memory);
-    images()->extend(memory);
-    return {memory, nullptr};
-  }
-  return shared(u);
-}
-
-BodyProblem::Seen BodyProblem::shared(ConstFieldView field) {
-  if (ghosts_) ghosts_->forward(Seen::writable(field));
-  return {field, ghosts()};
-}
-
-void BodyProblem::settle(FieldView force) const {
-  if (images()) images()->fold(force);
-  if (ghosts_) ghosts_->clear(force);
-}
-
-void BodyProblem::finish(FieldView force, EvaluationStatus& status) {
-  if (ghosts_) agree(status);
-  if (status.ok()) settle(force);
-}
-
-template <class Fill>
-void BodyProblem::over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const {
-  if (!images()) return fill(K);
-  full.convex = K.convex;
-  fill(full);
-  images()->fold(full, K);
-}
 
 namespace {
 
@@ -142,38 +68,25 @@ void BodyProblem::describe(EvaluationStatus& status) const {
   status.description = fmt::format("inadmissible deformation {}, kinematics {}, material {}", status.description, parts_.kinematics, parts_.materials[status.material]);
 }
 
-void BodyProblem::share(FieldView field) {
-  if (ghosts_) ghosts_->forward(field);
-}
-
 EvaluationStatus BodyProblem::evaluate_forces(const Configuration& at, FieldView force, double* energy) {
   const ConstFieldView u = at.unfinished();
   EvaluationStatus status;
   kept_.reset();
   const Sampling asked = std::exchange(along_, Sampling::nothing);
-  if (at.motion() && (!at.motion()->inside() || asked != Sampling::nothing || ghosts_ || images())) at.motion()->finish();
-  const auto seen_at = [&](ConstFieldView seen) { return Configuration(seen, at.time(), at.time_step(), at.velocity()); };
+  if (at.motion() && (!at.motion()->inside() || asked != Sampling::nothing || surroundings_.any())) at.motion()->finish();
   // Where histories go on or bonds fail between forces and samples these are others.
-  if (asked != Sampling::nothing && !terms().material_points() && !ghosts_ && !parts_.fracture.damage()) {
+  if (asked != Sampling::nothing && !terms().material_points() && !ghosts() && !parts_.fracture.damage()) {
     PointSamples samples{.asked = asked};
-    status = terms().forces_and_samples(seen_at(seen(u, seen_)), force, energy, samples);
+    status = terms().forces_and_samples(Configuration(seen(u, seen_), at.time(), at.time_step(), at.velocity()), force, energy, samples);
     if (status.ok()) kept_ = std::move(samples);
     kept_at_ = fingerprint_of(u);
-  } else if (!ghosts_) {
-    status = terms().forces(images() ? seen_at(seen(u, seen_)) : at, force, energy);
-  } else if (!images()) {
-    ghosts_->start(Seen::writable(u));
-    status = terms().forces(seen_at(Seen(u, ghosts())).arriving(*ghosts_), force, energy);
   } else {
-    copy(u, seen_);
-    ghosts_->start(seen_);
-    Extension extension(*ghosts_, *images(), seen_);
-    status = terms().forces(seen_at(seen_).arriving(extension), force, energy);
+    status = surroundings_.arriving(at, seen_, [&](const Configuration& seen_at) { return world_.forces(seen_at, force, energy); });
   }
   describe(status);
   energy_wanted_ = energy != nullptr;
   // What is looked for on all ranks, all ranks look for.
-  if (ghosts_ && weak_springs_ && weak_springs_->any()) agree(status);
+  if (weak_springs_ && weak_springs_->any()) surroundings_.agree(status);
   if (weak_springs_ && status.ok()) {
     if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
     else status = weak_springs_->refuse(seen(u, seen_));
@@ -185,22 +98,22 @@ EvaluationStatus BodyProblem::evaluate_forces(const Configuration& at, FieldView
 EvaluationStatus BodyProblem::external_forces(const Configuration& at, FieldView force) {
   if (!loads().follow()) {
     loads().evaluate(at.time(), force);
-    if (ghosts_ && images()) ghosts_->clear(force);
+    if (ghosts() && images()) ghosts()->clear(force);
     return {};
   }
   PointSamples samples{.asked = Sampling::H};
   EvaluationStatus status = terms().sample(at.moved_to(seen(at.u(), seen_)), samples);
-  agree(status);
+  surroundings_.agree(status);
   if (!status.ok()) return status;
-  if (ghosts_ && images()) {
+  if (ghosts() && images()) {
     // Sources may be ghosts. As many components at a time as displacements have.
     const FieldView H = samples.H;
     for (int c = 0; c < H.components; c += dimension())
-      ghosts_->forward({H.component(c), H.stride, std::min(dimension(), H.components - c)});
+      surroundings_.share({H.component(c), H.stride, std::min(dimension(), H.components - c)});
   }
   if (images()) continue_gradients(*parts_.families, *images(), seen_, samples.H);
   loads().evaluate(at.time(), force, &samples.H);
-  if (ghosts_) ghosts_->clear(force);
+  if (ghosts()) ghosts()->clear(force);
   return status;
 }
 
@@ -220,8 +133,7 @@ EvaluationStatus BodyProblem::add_load_stiffness(const Configuration& at, ConstF
 }
 
 EvaluationStatus BodyProblem::tangent_action(const Configuration& at, ConstFieldView w, FieldView Kw) {
-  if (images() && seen_direction_.size() == 0) seen_direction_ = make_field();
-  EvaluationStatus status = terms().tangent(at.moved_to(seen(at.u(), seen_)), seen(w, seen_direction_), Kw);
+  EvaluationStatus status = world_.tangent(at.moved_to(seen(at.u(), seen_)), seen(w, seen_direction_), Kw);
   if (weak_springs_ && weak_springs_->hold() && status.ok()) weak_springs_->add_tangent(w, Kw);
   finish(Kw, status);
   return status;
@@ -230,7 +142,7 @@ EvaluationStatus BodyProblem::tangent_action(const Configuration& at, ConstField
 EvaluationStatus BodyProblem::assemble_tangent(const Configuration& at, BlockMatrix& K) {
   refuse_ranks(parts_);
   EvaluationStatus status;
-  over_own(K, tangent_of_terms_, [&](BlockMatrix& of_terms) { status = terms().assemble(at.moved_to(seen(at.u(), seen_)), of_terms); });
+  surroundings_.fold(K, tangent_of_terms_, [&](BlockMatrix& of_terms) { status = terms().assemble(at.moved_to(seen(at.u(), seen_)), of_terms); });
   if (status.ok()) hold_loose_points(terms().changed_bonds(), K);
   if (status.ok() && weak_springs_ && weak_springs_->hold()) weak_springs_->add_to(K);
   return status;
@@ -246,7 +158,7 @@ AssembledSize BodyProblem::assembled_size() {
 void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K, double most_bulk) {
   if (!companion_) companion_ = std::make_unique<Companion>(*parts_.families, laws());
   companion_->limit_bulk(most_bulk);
-  over_own(K, companion_of_terms_, [&](BlockMatrix& of_terms) {
+  surroundings_.fold(K, companion_of_terms_, [&](BlockMatrix& of_terms) {
     companion_->assemble(seen(u, seen_), of_terms);
     constexpr double end = 1;   // of the load parameter: the matrix does not depend on when it is made, and runs go on to the bit
     terms().add_stiffness_of_points({u, end}, of_terms);   // where a point is inadmissible, forces say so
@@ -254,16 +166,16 @@ void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K, double mo
 }
 
 bool BodyProblem::constant_stiffness() const noexcept {
-  return terms().constant_tangent() && !parts_.fracture.damage();
+  return world_.constant_tangent() && !parts_.fracture.damage();
 }
 
 void BodyProblem::accept() {
-  const double dissipated = terms().accept();
+  const double dissipated = world_.accept();
   state().energies.dissipated += dissipated;
   state().energies.dissipated_by_laws += dissipated;
 }
 
-void BodyProblem::revert() { terms().revert(); }
+void BodyProblem::revert() { world_.revert(); }
 
 bool BodyProblem::update_bonds(const Configuration& at, double elapsed, FieldView velocity) {
   const ConstFieldView u = at.u();
@@ -276,14 +188,14 @@ bool BodyProblem::update_bonds(const Configuration& at, double elapsed, FieldVie
   if (velocity.data) {
     step.begin = [&](FieldView before) {
       combine(1, u, -elapsed, velocity, before);
-      if (ghosts_) ghosts_->forward(before);
+      surroundings_.share(before);
       if (images()) images()->extend(before);
     };
     step.act = [&](FieldView force, double time, double moment) {
       const double growth = push(force, time, (1 - moment) * elapsed, velocity, moved);
       // `whole` follows.
       if (images()) seen(u, seen_);
-      else if (ghosts_) ghosts_->forward(Seen::writable(u));
+      else surroundings_.share(Seen::writable(u));
       return growth;
     };
   }
@@ -334,7 +246,7 @@ double BodyProblem::push(FieldView force, double time, double since, FieldView v
 void BodyProblem::renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost) {
   double* const energy = energy_wanted_ ? &state().energies.strain : nullptr;
   EvaluationStatus status;
-  if (ghosts_ || images() || weak_springs_) {
+  if (surroundings_.any() || weak_springs_) {
     status = evaluate_forces(at, state().internal_force(), energy);
   } else {
     status = terms().renew_forces(at, moved, lost, state().internal_force(), energy);
@@ -374,93 +286,14 @@ void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
   find_pieces(false);
 }
 
-namespace {
-
-/// Of snapshots, which begin with it; the first ones began with a stride, a multiple of 8.
-constexpr std::uint64_t snapshot_format = 2;
-
-std::uint64_t stride_of(ByteReader& in) {
-  if (in.value<std::uint64_t>() != snapshot_format)
-    throw InputError("the saved state has another layout than this version of perikit reads");
-  return in.value<std::uint64_t>();
-}
-
-}  // namespace
-
-void BodyProblem::write_snapshot(const std::function<void(std::uint64_t)>& begin,
-                                 const std::function<void(std::span<const std::byte>)>& next) const {
-  const bool first = communicator().rank() == 0;
-  const HistoryRecord history(terms());
-  ByteWriter head;
-  head.value(snapshot_format);
-  head.value(static_cast<std::uint64_t>(body().stride_of_all_ranks()));
-  values_.constraints.write(head);
-  const std::vector<std::byte> bytes = head.take();
-  const std::uint64_t size = bytes.size() + parts_.fracture.written(terms()) + history.written() + values_.state.written();
-  if (first) begin(size);
-  ByteWriter out([&](std::span<const std::byte> piece) {
-    if (first) next(piece);
-  });
-  out.bytes(bytes.data(), bytes.size());
-  parts_.fracture.write(terms(), out);
-  history.write(out);
-  values_.state.write(out);
-  out.finish();
-}
-
-std::vector<std::byte> BodyProblem::snapshot() const {
-  ByteWriter out;
-  out.value(static_cast<std::uint64_t>(body().stride()));
-  values_.constraints.write(out);
-  parts_.fracture.write_here(terms(), out);
-  HistoryRecord::write_here(terms(), out);
-  values_.state.write_here(out);
-  return out.take();
-}
-
 void BodyProblem::restore(std::span<const std::byte> bytes) {
-  ByteReader in(bytes);
-  if (in.value<std::uint64_t>() != body().stride()) throw InputError("the saved state belongs to another body");
-  constraints().read(in);
-  parts_.fracture.read_here(terms(), in);
-  HistoryRecord::read_here(in, terms());
-  state().read_here(in);
-  if (!in.done()) throw InputError("the saved state is damaged");
+  saved_state_.read_here(bytes);
   find_pieces(false);
 }
 
 void BodyProblem::restore(ByteReader& in) {
-  if (stride_of(in) != body().stride_of_all_ranks()) throw InputError("the saved state belongs to another body");
-  constraints().read(in);
-  parts_.fracture.read(terms(), in);
-  HistoryRecord::read(in, terms());
-  state().read(in);
-  if (!in.done()) throw InputError("the saved state is damaged");
+  saved_state_.read(in);
   find_pieces(false);
-}
-
-BodyProblem::Carried BodyProblem::carried_by(ByteReader& snapshot) {
-  stride_of(snapshot);
-  snapshot.value<double>();  // of the constraints
-  Carried carried;
-  FractureRecord::read_bonds(snapshot, [&](std::span<const NamedChange> bonds) { carried.bonds += bonds.size(); });
-  carried.history = HistoryRecord::count(snapshot);
-  return carried;
-}
-
-void BodyProblem::carry(ByteReader& snapshot) {
-  if (stride_of(snapshot) != body().stride_of_all_ranks()) throw InputError("the earlier run had another body");
-  snapshot.value<double>();      // of the constraints
-  std::vector<BondChange> lost;  // of the bonds that cracks of this scene leave
-  bool any = false;
-  FractureRecord::read_bonds(snapshot, [&](std::span<const NamedChange> bonds) {
-    any = true;
-    for (const BondChange& change : terms().bonds_here(bonds))
-      if (parts_.families->integrity(change.bond) > change.integrity) lost.push_back(change);
-  });
-  // On several ranks all of them restore, whoever has such bonds.
-  if (!lost.empty() || (ghosts_ && any)) terms().restore_bonds(lost);
-  HistoryRecord::read(snapshot, terms());
 }
 
 std::size_t BodyProblem::bytes() const noexcept {

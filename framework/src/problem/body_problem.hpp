@@ -1,7 +1,7 @@
 #pragma once
-/// The Problem of one body: its families, its terms, and what holds and loads it.
+/// The Problem of one body: evaluations by its terms, with what holds loose pieces, and bonds that fail. What ghosts and images change of them is in
+/// Surroundings, what a run continues from in SavedState.
 
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,12 +12,13 @@
 #include "perikit/problem/problem.hpp"
 #include "problem/driven_work.hpp"
 #include "problem/fracture/fracture_record.hpp"
+#include "problem/saved/saved_state.hpp"
+#include "problem/surroundings/surroundings.hpp"
+#include "problem/world.hpp"
 #include "terms/term.hpp"
-#include "problem/ghosts.hpp"
 
 namespace perikit {
 
-class ByteReader;
 class Companion;
 class Families;
 class NearBonds;
@@ -48,7 +49,7 @@ class BodyProblem final : public Problem {
   BodyProblem(ProblemParts parts, ProblemValues values);
   ~BodyProblem() override;
 
-  void share(FieldView field) override;
+  void share(FieldView field) override { surroundings_.share(field); }
   EvaluationStatus evaluate_forces(const Configuration& at, FieldView force, double* energy) override;
   EvaluationStatus external_forces(const Configuration& at, FieldView force) override;
   EvaluationStatus add_load_stiffness(const Configuration& at, ConstFieldView w, FieldView Kw) override;
@@ -73,29 +74,19 @@ class BodyProblem final : public Problem {
   std::vector<std::byte> bonds() const override;
   void restore_bonds(std::span<const std::byte> bonds) override;
 
-  /// What a snapshot of another run of this body holds of its bonds and of the history of its laws: bonds that are not as they were at its
-  /// set-up, and numbers of history.
-  struct Carried {
-    std::size_t bonds = 0, history = 0;
-  };
-  static Carried carried_by(ByteReader& snapshot);
-  /// Takes bonds and history of that run; its points, families and laws must be these. Throws InputError where they cannot be.
-  void carry(ByteReader& snapshot);
-
   /// Quasi-static runs: from now on pieces of the body that nothing holds are known. Where loads move one, forces are refused and
   /// the status names it; weak_springs > 0 holds their points by springs of this share of a point's stiffness. Returns what is
   /// loose now, in words; empty: nothing. All ranks must call it.
   std::string watch_pieces(double weak_springs);
 
-  /// Everything that a run continues from of this rank, as bytes; restore is bitwise. All ranks must call restore, which throws
-  /// InputError for what belongs to another problem.
-  std::vector<std::byte> snapshot() const;
+  // See SavedState. All ranks must call them.
+  std::vector<std::byte> snapshot() const { return saved_state_.write_here(); }
+  void write_snapshot(const std::function<void(std::uint64_t size)>& begin, const std::function<void(std::span<const std::byte>)>& next) const {
+    saved_state_.write(begin, next);
+  }
   void restore(std::span<const std::byte> bytes);
-  /// That of all ranks, on rank 0: begin(how many bytes), then next(some of them) until all are out. Nobody has all points of all
-  /// ranks at once, and any number of ranks may restore them. All ranks must call both.
-  void write_snapshot(const std::function<void(std::uint64_t size)>& begin,
-                      const std::function<void(std::span<const std::byte>)>& next) const;
   void restore(ByteReader& in);
+  void carry(ByteReader& in) { saved_state_.carry(in, families()); }
 
   /// Whether laws or terms lose energy.
   bool dissipates() const noexcept { return laws().dissipates() || terms().driven(Drive::loss); }
@@ -105,7 +96,7 @@ class BodyProblem final : public Problem {
   const Families& families() const noexcept { return *parts_.families; }
   /// Null where one rank has the whole body.
   const Partition* partition() const noexcept { return parts_.partition.get(); }
-  const Ghosts* ghosts() const noexcept { return ghosts_ ? &*ghosts_ : nullptr; }
+  const Ghosts* ghosts() const noexcept { return surroundings_.ghosts(); }
   std::string fracture_summary() const {
     const Energies& e = values_.state.energies;
     return parts_.fracture.summary(terms().bond_checks(), e.dissipated - e.dissipated_by_laws);
@@ -125,37 +116,12 @@ class BodyProblem final : public Problem {
   ProblemParts parts_;
   ProblemValues values_;
   DrivenWork driven_work_;
-  std::optional<Ghosts> ghosts_;
-  /// A field as the terms see it, as long as this lives. Values of ghosts lie in the field itself meanwhile, and are zero again, as they
-  /// are in all fields of a problem, after it; none of an owner changes, so that a field that its caller may only read is taken as well.
-  class Seen {
-   public:
-    Seen(ConstFieldView field, const Ghosts* ghosts) : field_(field), ghosts_(ghosts) {}
-    Seen(const Seen&) = delete;
-    Seen& operator=(const Seen&) = delete;
-    ~Seen() {
-      if (ghosts_) ghosts_->clear(writable(field_));
-    }
-    operator ConstFieldView() const noexcept { return field_; }
-    static FieldView writable(ConstFieldView u) noexcept { return {const_cast<double*>(u.data), u.stride, u.components}; }
+  Surroundings surroundings_;
+  World world_;
+  SavedState saved_state_;
 
-   private:
-    ConstFieldView field_;
-    const Ghosts* ghosts_;   ///< null where there is nothing to clear
-  };
-
-  /// u with the values of ghosts and, where there are any, of images; `memory` holds the latter.
-  Seen seen(ConstFieldView u, Field& memory);
-  /// A field with the values of ghosts, without images.
-  Seen shared(ConstFieldView field);
-  /// Forces of the terms -> those of the problem: of images they go to where they belong, those on ghosts are nobody's.
-  void settle(FieldView force) const;
-  /// Ends an evaluation: one status for all ranks, and forces of the problem.
-  void finish(FieldView force, EvaluationStatus& status);
-  /// fill(K) makes the matrix over all points that the terms see; K <- the one that the problem has of it.
-  template <class Fill>
-  void over_own(BlockMatrix& K, BlockMatrix& full, Fill&& fill) const;
-
+  Seen seen(ConstFieldView u, Field& memory) { return surroundings_.seen(u, memory); }
+  void finish(FieldView force, EvaluationStatus& status) const { surroundings_.finish(force, status); }
   /// What evaluations of forces say of inadmissible deformation.
   void describe(EvaluationStatus& status) const;
   /// Looks anew for pieces that nothing holds, where they are watched. fresh: see WeakSprings.
@@ -165,7 +131,7 @@ class BodyProblem final : public Problem {
   /// Forces and strain energy become those of the bonds that are left, where the points are.
   void renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost);
 
-  Field seen_, seen_direction_;
+  Field seen_, seen_direction_;   ///< what terms see, with images
   bool energy_wanted_ = false;   ///< by the last evaluation of forces
   Sampling along_ = Sampling::nothing;   ///< with the next one
   std::optional<PointSamples> kept_;     ///< with the last one

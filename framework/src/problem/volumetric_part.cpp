@@ -9,19 +9,19 @@ namespace perikit {
 class BodyProblem::Volumes final : public VolumetricPart {
  public:
   Volumes(BodyProblem& problem, std::unique_ptr<VolumetricRows> rows)
-      : problem_(problem), rows_(std::move(rows)), memory_(problem.images() ? problem.make_field() : Field()) {}
+      : problem_(problem), rows_(std::move(rows)), surroundings_(problem.surroundings_) {}
 
   EvaluationStatus linearise(ConstFieldView u) override {
-    EvaluationStatus status = problem_.terms().status(rows_->linearise(problem_.seen(u, memory_)));
-    problem_.finish({}, status);
+    EvaluationStatus status = problem_.terms().status(rows_->linearise(surroundings_.seen(u, memory_)));
+    surroundings_.finish({}, status);
     return status;
   }
-  void rates(ConstFieldView w, FieldView q) const override { own(q, [&] { rows_->rates(problem_.seen(w, memory_), q); }); }
+  void rates(ConstFieldView w, FieldView q) const override { own(q, [&] { rows_->rates(surroundings_.seen(w, memory_), q); }); }
   void forces(ConstFieldView q, FieldView f) const override {
-    rows_->forces(problem_.shared(q), f);
-    problem_.settle(f);
+    rows_->forces(surroundings_.shared(q), f);
+    surroundings_.settle(f);
   }
-  void squares(ConstFieldView c, FieldView q) const override { own(q, [&] { rows_->squares(problem_.shared(c), q); }); }
+  void squares(ConstFieldView c, FieldView q) const override { own(q, [&] { rows_->squares(surroundings_.shared(c), q); }); }
   ConstFieldView logarithms() const override { return rows_->logarithms(); }
   ConstFieldView stiffness() const override { return rows_->stiffness(); }
 
@@ -29,11 +29,12 @@ class BodyProblem::Volumes final : public VolumetricPart {
   template <class Fill>
   void own(FieldView q, Fill&& fill) const {
     fill();
-    if (problem_.ghosts()) problem_.ghosts()->clear(q);
+    if (surroundings_.ghosts()) surroundings_.ghosts()->clear(q);
   }
 
   BodyProblem& problem_;
   std::unique_ptr<VolumetricRows> rows_;
+  Surroundings& surroundings_;
   mutable Field memory_;
 };
 

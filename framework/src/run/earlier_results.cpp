@@ -51,7 +51,7 @@ class EarlierRun {
 
   std::string carry(const Checkpoint& checkpoint) {
     ByteReader state = checkpoint_state(folder_);
-    const BodyProblem::Carried carried = BodyProblem::carried_by(state);
+    const Carried carried = SavedState::carried_by(state);
     if (carried.bonds == 0 && carried.history == 0) return {};
     const std::string what = carried.bonds > 0 ? fmt::format("results of a run in which {} bonds had failed", carried.bonds)
                                                : "results of a run whose laws have a history";

@@ -220,7 +220,7 @@ StatefulTerm* Terms::stateful() const noexcept { return terms_.front()->stateful
 
 std::size_t Terms::groups() const noexcept { return parts_.families->body().stride() / padding; }
 
-void Terms::add_owned(const std::vector<GroupEnergy>& energies, double GroupEnergy::* which, ExactSum& sum) const {
+void Terms::add_owned(std::span<const GroupEnergy> energies, double GroupEnergy::* which, ExactSum& sum) const {
   const Body& body = parts_.families->body();
   for (std::size_t g = 0; g < energies.size(); ++g)
     for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
@@ -229,6 +229,17 @@ void Terms::add_owned(const std::vector<GroupEnergy>& energies, double GroupEner
       break;
     }
 }
+
+namespace {
+
+/// The points of the body <- 0. They may be a slice of the fields of several bodies.
+void clear(const Body& body, FieldView field) {
+  over_blocks(body.stride(), [&](std::size_t begin, std::size_t end) {
+    for (int c = 0; c < field.components; ++c) std::fill(field.component(c) + begin, field.component(c) + end, 0.0);
+  });
+}
+
+}  // namespace
 
 /// add(term, sum) adds the forces of a term to `force`, which is zero.
 template <class Add>
@@ -254,7 +265,7 @@ EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView 
 }
 
 EvaluationStatus Terms::forces(const Configuration& at, FieldView force, double* energy) {
-  if (!at.motion()) fill(0, force);
+  if (!at.motion()) clear(body(), force);
   return forces_by([&](Term& term, const ForceSum& sum) { return term.forces(at, {}, sum); }, at, force, energy);
 }
 
@@ -323,7 +334,7 @@ EvaluationStatus Terms::renew_forces(const Configuration& at, std::span<const st
 }
 
 EvaluationStatus Terms::tangent(const Configuration& at, ConstFieldView w, FieldView Kw, const GroupRings* rings) {
-  fill(0, Kw);
+  clear(body(), Kw);
   const Region region = rings ? Region{&rings->only, &rings->near} : Region{};
   return each_term([&](Term& term) { return term.tangent(at, w, region, Kw); });
 }

@@ -90,6 +90,9 @@ class Terms {
   /// That an evaluation of this term, or of the first one, met this inadmissible point (field index), or none (-1).
   EvaluationStatus status(std::int64_t bad, const Term* term = nullptr) const;
   const Body& body() const noexcept;
+  bool bonds_may_fail() const noexcept { return parts_.damage != nullptr; }
+  /// sum += energies of the groups of eight points of the body that this rank owns.
+  void add_owned(std::span<const GroupEnergy> energies, double GroupEnergy::* which, ExactSum& sum) const;
 
   /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
   bool has_gradients() const noexcept { return parts_.formulation.pairs == nullptr; }
@@ -162,8 +165,6 @@ class Terms {
   int coupling_reach() const;
   StatefulTerm* stateful() const noexcept;
   std::size_t groups() const noexcept;
-  /// sum += those that this rank owns.
-  void add_owned(const std::vector<GroupEnergy>& energies, double GroupEnergy::* which, ExactSum& sum) const;
   class PointBlocks;
   struct Assemblies;
   struct Failing;

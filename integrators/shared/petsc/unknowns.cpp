@@ -22,9 +22,9 @@ Unknowns::Unknowns(Problem& problem, const BlockMatrix& K, ConstFieldView free)
     row_.push_back(static_cast<std::int32_t>(r));
     point_.push_back(p);
   }
-  const Counted points = counted(mine());
-  before_ = points.before;
-  of_all_ = points.all;
+  const Counted rows = counted(mine());
+  before_ = rows.before;
+  of_all_ = rows.all;
   for (std::size_t k = 0; k < point_.size(); ++k)
     number_.data()[point_[k]] = static_cast<double>(before_ + static_cast<std::int64_t>(k));
   problem.share(number_);

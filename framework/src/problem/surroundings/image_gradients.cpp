@@ -1,4 +1,4 @@
-#include "problem/image_gradients.hpp"
+#include "problem/surroundings/image_gradients.hpp"
 
 #include <vector>
 

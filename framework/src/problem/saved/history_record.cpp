@@ -1,4 +1,4 @@
-#include "problem/history_record.hpp"
+#include "problem/saved/history_record.hpp"
 
 #include <algorithm>
 
