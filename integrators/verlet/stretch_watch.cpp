@@ -15,6 +15,8 @@ constexpr double least_power = 1, largest_power = 8;
 constexpr double steady_power = 2;
 /// Ritz values with such a bound have converged: they are off by much less.
 constexpr double exact = 1.03;
+/// What is left of the speed of stretches at each look, where they are slower then.
+constexpr double of_late = 0.7;
 /// An estimate after less tells nothing.
 constexpr double least_margin = 0.01;
 
@@ -35,7 +37,8 @@ void StretchWatch::estimated(StretchRange range, std::int64_t step, EigenvalueBo
   largest_ = range.largest;
   eigenvalue_ = eigenvalue.ritz;
   margin_ = eigenvalue.bound > 0 ? std::max(least_margin, std::log(std::max(1.0, tolerated / eigenvalue.bound)) / power_) : least_margin;
-  before_ = 0;
+  seen_least_ = range.least;
+  seen_largest_ = range.largest;
   last_ = static_cast<double>(step);
   next_ = last_ + shortest;
 }
@@ -45,12 +48,14 @@ double StretchWatch::enough(double tolerated) const { return power_ > 0 && power
 bool StretchWatch::look(StretchRange range, std::int64_t step) {
   const double changed = change(range);
   if (changed >= margin_) return true;
-  // Half of the steps after which it is reached if it goes on like that.
-  const double now = static_cast<double>(step), rate = (changed - before_) / (now - last_);
-  const double steps = rate > 0 ? 0.5 * (margin_ - changed) / rate : longest;
+  // Half of the steps after which it is reached as fast as stretches have changed of late, up or down: bodies swing, and what falls rises again.
+  const double now = static_cast<double>(step), moved = std::max(std::abs(std::log(range.largest / seen_largest_)), std::abs(std::log(range.least / seen_least_)));
+  fastest_ = std::max(moved / (now - last_), of_late * fastest_);
+  const double steps = fastest_ > 0 ? 0.5 * (margin_ - changed) / fastest_ : longest;
   next_ = now + std::floor(std::clamp(steps, shortest, longest));
   last_ = now;
-  before_ = changed;
+  seen_least_ = range.least;
+  seen_largest_ = range.largest;
   return false;
 }
 

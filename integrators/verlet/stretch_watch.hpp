@@ -11,10 +11,10 @@ namespace perikit {
 /// rare where stretches change slowly.
 class StretchWatch {
  public:
-  static constexpr std::size_t numbers = 8;
+  static constexpr std::size_t numbers = 10;
   /// The numbers are kept with the state of the run.
   explicit StretchWatch(std::span<double> kept)
-      : least_(kept[0]), largest_(kept[1]), eigenvalue_(kept[2]), power_(kept[3]), margin_(kept[4]), before_(kept[5]), last_(kept[6]), next_(kept[7]) {}
+      : least_(kept[0]), largest_(kept[1]), eigenvalue_(kept[2]), power_(kept[3]), margin_(kept[4]), seen_least_(kept[5]), seen_largest_(kept[6]), fastest_(kept[7]), last_(kept[8]), next_(kept[9]) {}
 
   /// The largest eigenvalue, and the one that is tolerated.
   void estimated(StretchRange range, std::int64_t step, EigenvalueBounds eigenvalue, double tolerated);
@@ -33,7 +33,8 @@ class StretchWatch {
   double& eigenvalue_;         ///< the Ritz value that it found; 0: none yet
   double& power_;              ///< of the stretch, with which eigenvalues are expected to rise; 0: nothing is known
   double& margin_;             ///< of the change
-  double& before_;             ///< change at the last look
+  double &seen_least_, &seen_largest_;   ///< stretches at the last look
+  double& fastest_;            ///< change of their logarithms in a step, of late
   double& last_;               ///< step of that look, or of the estimate
   double& next_;               ///< step of the next look
 };

@@ -2,6 +2,7 @@
 
 import copy
 import itertools
+import math
 import random
 import re
 
@@ -109,8 +110,8 @@ def extent(scene):
     return float(numpy.max(rows[:, :3].max(axis=0) - rows[:, :3].min(axis=0)))
 
 
-def changed_scene(scene, change, tables):
-    """The scene in the new coordinates and units. Numbers are taken by the units of their keys, so that new keys need no line here."""
+def changed_scene(scene, change, tables, points):
+    """The scene in the new coordinates and units, of a body with these points. Numbers are taken by the units of their keys, so that new keys need no line here."""
     out = copy.deepcopy(scene)
     section = {1: "area", 2: "thickness"}.get(scene["body"]["dimension"])
     if section:   # 1 unless given, in any unit
@@ -120,7 +121,8 @@ def changed_scene(scene, change, tables):
         cells = [round((high - low) / lattice["spacing"]) for low, high in zip(lattice["lower"], lattice["upper"])]
         lattice["upper"] = [low + n * lattice["spacing"] for low, n in zip(lattice["lower"], cells)]
         for plane in out.get("symmetry", []):
-            plane.setdefault("at", lattice["lower"][AXES.index(plane["axis"])])
+            a, h = AXES.index(plane["axis"]), lattice["spacing"]
+            plane.setdefault("at", lattice["lower"][a] + h * math.floor((float(points[:, a].min()) - lattice["lower"][a]) / h))   # below the lowest cell
     for name, content in out.items():
         if name in tables.sections:
             for item in content if isinstance(content, list) else [content]:

@@ -168,11 +168,12 @@ def changed(kind, trial, out, done):
     change = random_change(kind, trial.scene, str(trial.scene))
     if change is None or unstable(out):
         return ""
-    scene = with_steps_of(changed_scene(with_places_of_points(trial.scene, reference(out)["position"]), change, trial.tables), out, change.time)
+    points = reference(out)["position"]
+    scene = with_steps_of(changed_scene(with_places_of_points(trial.scene, points), change, trial.tables, points), out, change.time)
     other, folder = trial.run(kind, scene=scene)
     if other.status != done.status:
         return "" if planned_anew(out) else status_words(other, done)
-    X, Y = change.places(reference(out)["position"]), reference(folder)["position"]
+    X, Y = change.places(points), reference(folder)["position"]
     places = pairing(X, Y)
     if places is None:
         return "other points"
@@ -189,9 +190,12 @@ def changed(kind, trial, out, done):
 
 
 def unstable(folder):
-    """Whether rounding says where the body goes, whose equilibria are no minima of the energy, or which side a point is on."""
-    with open(folder + "/run.log") as log:
-        return re.search("warning:.*(stable|positive definite|rounding decides|passes through points)", log.read()) is not None
+    """Whether rounding says where the body goes, whose equilibria are no minima of the energy, or which side a point is on; or which of several equilibria is
+    found, as where a law for small strains is strained beyond a half under a load that follows."""
+    with open(folder + "/run.log") as file:
+        log = file.read()
+    strained = [float(most) for most in re.findall(r"strains or rotations were not small in .*, at most (\S+) at", log)]
+    return re.search("warning:.*(stable|positive definite)|warning.*(rounding decides|passes through points)", log) is not None or max(strained, default=0) > 0.5
 
 
 def pairing(X, Y):
