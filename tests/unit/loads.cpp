@@ -60,8 +60,9 @@ TEST_CASE("traction: exact total on a jittered cloud, with one layer or two in t
   }
 }
 
-TEST_CASE("traction: the forces on a face are the same whatever materials meet there") {
+TEST_CASE("traction: the forces on a face are the same whatever materials meet there, and whatever acts beside them") {
   const std::string regions =
+      "[[term]]\ntype = \"foundation\"\nset = \"all\"\nstiffness = 1000.0\n"
       "[[region]]\nset = \"right\"\nmaterial = { type = \"neo_hookean\", shear_modulus = 3.0, bulk_modulus = 900.0 }\n"
       "[[region]]\nset = \"low\"\nmaterial = { type = \"saint_venant_kirchhoff\", youngs_modulus = 7.0, poisson_ratio = 0.1 }\n";
   for (const char* kinematics :

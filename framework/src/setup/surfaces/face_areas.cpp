@@ -68,6 +68,7 @@ Field face_areas(TermParts parts, int axis, UnitStress unit) {
   parts.stabilization = nullptr;  // a homogeneous deformation has no zero-energy part
   parts.damage = nullptr;
   parts.interfaces = nullptr;  // one law on both sides
+  parts.further.clear();       // they have no stress
   parts.skip = parts.share = true;
   Terms terms(parts);   // over the families that are there
   const Field rest = body.make_field(body.dimension());
