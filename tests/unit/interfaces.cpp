@@ -179,6 +179,32 @@ TEST_CASE("interfaces: the distance from a circle, whatever the number of thread
   }
 }
 
+TEST_CASE("interfaces: points do not see a surface from behind, through another material") {
+  for (const bool upside_down : {false, true}) {
+    // From beyond the layers of 0 and 2 the points of 1 have the surface between 0 and 1 behind it.
+    const auto layers = [&](const Point& x) {
+      const double y = upside_down ? 1 - x[1] : x[1];
+      return static_cast<std::uint16_t>(y < 0.3 ? 1 : y < 0.4 ? 0 : y < 0.5 ? 2 : 1);
+    };
+    const Body body = lattice_body(2, 10, layers);
+    const Interfaces found = find(body, 0.6);
+    REQUIRE(found.all.size() == 3);
+    const Interface& of = found.all[0];
+    REQUIRE((of.first == 0 && of.second == 1));
+    for (const std::int32_t p : body.internal()) {
+      const Point& x = body.position(static_cast<std::size_t>(p));
+      const double height = (upside_down ? 1 - x[1] : x[1]) - 0.3;
+      const std::ptrdiff_t k = of.find(p);
+      if (layers(x) == 2 || height > 0.2) {
+        CHECK(k < 0);
+      } else {
+        REQUIRE(k >= 0);
+        CHECK(of.distance[static_cast<std::size_t>(k)] == doctest::Approx(-height).epsilon(1e-12));
+      }
+    }
+  }
+}
+
 TEST_CASE("interfaces: none between equal materials; where they are whatever cracks; one for each pair") {
   const auto halves = [](const Point& x) { return static_cast<std::uint16_t>(x[0] > 0.5); };
   CHECK(find(lattice_body(2, 10, [](const Point&) { return std::uint16_t{1}; }), 1).empty());

@@ -128,30 +128,56 @@ void fit_plane(int dimension, const std::vector<Crossing>& all, const Boxes& mid
   }
 }
 
-/// Blended over one more bond beyond the nearest midpoint, so that no side of a surface is preferred; sides at right angles to it are other surfaces.
-double blended_distance(const Point& x, std::size_t nearest, double from, std::span<const Crossing> all, const Boxes& middles) {
-  constexpr double across = 1e-6;   // cosine
-  double weight = 0, sum = 0;
-  middles.near(x, from + all[nearest].length, [&](std::size_t m, double square) {
-    if (dot(all[m].normal, all[nearest].normal) <= across) return;
-    const double w = falling(std::max(0.0, std::sqrt(square) - from) / all[nearest].length);
-    weight += w;
-    sum += w * dot(x - all[m].centre, all[m].normal);
-  });
-  return sum / weight;
-}
+/// Of one point.
+class DistanceOf {
+ public:
+  DistanceOf(const Point& x, bool in_first, std::span<const Crossing> all, const Boxes& middles)
+      : x_(x), in_first_(in_first), all_(all), middles_(middles) {}
+
+  /// Calls visit(m, square) for the midpoints up to `reach` away that the point can see. Those whose surface it is behind, by more than a bond, lie
+  /// beyond another material, as in stacks of three.
+  template <class Visit>
+  void near(double reach, const Visit& visit) const {
+    middles_.near(x_, reach, [&](std::size_t m, double square) {
+      if (!((in_first_ ? height(m) : -height(m)) > all_[m].length)) visit(m, square);
+    });
+  }
+
+  /// Blended over one more bond beyond the nearest midpoint, so that no side of a surface is preferred; sides at right angles to
+  /// it are other surfaces.
+  double blended(std::size_t nearest, double from) const {
+    constexpr double across = 1e-6;  // cosine
+    double weight = 0, sum = 0;
+    near(from + all_[nearest].length, [&](std::size_t m, double square) {
+      if (dot(all_[m].normal, all_[nearest].normal) <= across) return;
+      const double w = falling(std::max(0.0, std::sqrt(square) - from) / all_[nearest].length);
+      weight += w;
+      sum += w * height(m);
+    });
+    return sum / weight;
+  }
+
+ private:
+  double height(std::size_t m) const { return dot(x_ - all_[m].centre, all_[m].normal); }
+
+  const Point& x_;
+  bool in_first_;
+  std::span<const Crossing> all_;
+  const Boxes& middles_;
+};
 
 Distance distance_of(const Point& x, bool in_first, std::span<const Crossing> all, const Boxes& middles, double reach) {
+  const DistanceOf point(x, in_first, all, middles);
   double least = INFINITY;
-  middles.near(x, reach, [&](std::size_t, double square) { least = std::min(least, square); });
+  point.near(reach, [&](std::size_t, double square) { least = std::min(least, square); });
   if (!std::isfinite(least)) return {};
   // Of several midpoints that are equally near, in corners and in the middle of layers, each has its say.
   const double from = std::sqrt(least);
   double sum = 0;
   int count = 0;
   std::size_t first = all.size();
-  middles.near(x, std::min(reach, from * (1 + 1e-6)), [&](std::size_t m, double) {
-    sum += blended_distance(x, m, from, all, middles);
+  point.near(std::min(reach, from * (1 + 1e-6)), [&](std::size_t m, double) {
+    sum += point.blended(m, from);
     ++count;
     first = std::min(first, m);
   });
