@@ -215,7 +215,7 @@ std::vector<LoosePiece> find_loose_pieces(const Families& families, Problem& pro
 }
 
 const LoosePiece* driven_piece(const std::vector<LoosePiece>& pieces, const Body& body, ConstFieldView u, ConstFieldView force) {
-  constexpr std::size_t width = most_motions + 1;  // along each motion, and without signs
+  constexpr std::size_t width = most_motions + 1;  // along each motion, and at most: motions are across a force but for their rounding
   std::vector<double> work(width * pieces.size(), 0.0);
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     const LoosePiece& piece = pieces[i];
@@ -224,11 +224,10 @@ const LoosePiece* driven_piece(const std::vector<LoosePiece>& pieces, const Body
       const Point y = place(body, u, p);
       for (std::size_t k = 0; k < piece.motions.size(); ++k) {
         const Point w = piece.at(piece.motions[k], body.dimension(), y);
-        for (int c = 0; c < body.dimension(); ++c) {
-          const double part = force.component(c)[p] * w[static_cast<std::size_t>(c)];
-          along[k] += part;
-          along[most_motions] += std::abs(part);
-        }
+        Point f{};
+        for (int c = 0; c < body.dimension(); ++c) f[static_cast<std::size_t>(c)] = force.component(c)[p];
+        along[k] += f[0] * w[0] + f[1] * w[1] + f[2] * w[2];
+        along[most_motions] += std::hypot(f[0], f[1], f[2]) * std::hypot(w[0], w[1], w[2]);
       }
     }
   }
