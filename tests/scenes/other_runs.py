@@ -227,10 +227,24 @@ def rounding_energy(scene):
     return 1e-24 * max(moduli, default=0.0)
 
 
+def held(trial, fields):
+    """The points that equilibrium says the place of: not those that hang by a bond or two."""
+    torn = trial.scene["integrator"]["type"] in STATICS and "damage" in fields
+    return fields["damage"] < 0.9 if torn else slice(None)
+
+
+def balance(folder):
+    """How many points of a cloud have been balanced, and in how many rounds. Where families are too small for all of them, rounding chooses what gives way."""
+    with open(folder + "/run.log") as file:
+        return re.findall(r"(\d+ points balanced, \d+ more|weights in \d+ rounds)", file.read())
+
+
 def mapped_difference(trial, out, folder, places, value, time=1.0):
     """Row k of the fields in `folder` against row places[k] of those in `out`; nothing where the steps were planned anew on the way."""
     times, others = (history(of)["time"] for of in (out, folder))
     if len(times) != len(others) or numpy.max(numpy.abs(others - time * times), initial=0.0) > 1e-9 * time * numpy.max(times, initial=0.0):
+        return ""
+    if balance(out) != balance(folder):
         return ""
     if len(frames(out)) != len(frames(folder)):
         return "%d frames instead of %d" % (len(frames(folder)), len(frames(out)))
@@ -248,7 +262,7 @@ def mapped_difference(trial, out, folder, places, value, time=1.0):
             if expected is None:
                 continue
             scale = largest[name] * (numpy.max(numpy.abs(value(name, numpy.ones_like(fields[name])))) or 1.0)
-            off = numpy.nanmax(numpy.abs(others[name] - expected[places]), initial=0.0)
+            off = numpy.nanmax(numpy.abs(others[name] - expected[places])[held(trial, others)], initial=0.0)
             if name == "strain_energy_density" and off < rounding_energy(trial.scene):
                 continue
             if off > allowed * scale:
