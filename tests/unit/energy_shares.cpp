@@ -1,10 +1,12 @@
 /// Shares of the energy of a family, of every bond of it, however many there are.
 
-#include "terms/bond_energy_split.hpp"
+#include "terms/pairs/pair_energy_shares.hpp"
 
 #include <doctest/doctest.h>
 
 #include <string>
+
+#include "perikit/core/field.hpp"
 
 using namespace perikit;
 

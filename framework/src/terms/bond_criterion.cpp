@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/each_once.hpp"
+#include "families/bond_stretch.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "perikit/core/parallel.hpp"
 #include "terms/bond_energy_split.hpp"

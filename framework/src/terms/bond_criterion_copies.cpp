@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/each_once.hpp"
+#include "families/bond_stretch.hpp"
 #include "terms/bond_criterion.hpp"
 
 namespace perikit {

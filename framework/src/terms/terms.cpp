@@ -12,6 +12,7 @@
 #include "body/interfaces.hpp"
 #include "cloud_balance/consistency.hpp"
 #include "core/symmetric_matrix.hpp"
+#include "families/fracture/bond_monitor.hpp"
 #include "families/fracture/fracture.hpp"
 #include "families/fracture/shared_bonds.hpp"
 #include "families/lattice/lattice_families.hpp"

@@ -6,8 +6,6 @@
 #include <vector>
 
 #include "families/bonds.hpp"
-#include "families/family_arrays.hpp"
-#include "perikit/body/body.hpp"
 #include "perikit/model/configuration.hpp"
 
 namespace perikit {
@@ -27,10 +25,5 @@ class BondFinder {
   virtual std::size_t checked() const noexcept = 0;
   virtual std::size_t bytes() const noexcept = 0;
 };
-
-/// The stretch of a bond of a body at u.
-double bond_stretch(const Body& body, ConstFieldView u, BondId bond) noexcept;
-/// The same of bond k in the family of a point; equal bits from both ends.
-double bond_stretch(const FamilyArrays& family, std::size_t k, std::size_t point, ConstFieldView u) noexcept;
 
 }  // namespace perikit

@@ -14,21 +14,11 @@
 #include <vector>
 
 #include "families/bonds.hpp"
-#include "families/cloud/cloud_rows.hpp"
-#include "families/cloud/cloud_rows.hpp"
 #include "families/fracture/bond_finder.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
-
-/// What a loop over forces that knows the stretch of every bond of a cloud leaves behind, so that bonds far from failing are not looked at a
-/// second time.
-struct NearestFailure {
-  double least_onset = 0;                  ///< of the body
-  AlignedVector<double> excess;            ///< by point: largest e - least_onset |xi| of its bonds to larger indices [m]
-  const AlignedVector<Row>* u = nullptr;   ///< displacement of that evaluation, point-major; null: unknown
-};
 
 class BondMonitor : public BondFinder {
  public:

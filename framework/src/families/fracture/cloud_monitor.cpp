@@ -6,6 +6,7 @@
 #include "core/each_once.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "families/cloud/cloud_rows.hpp"
+#include "families/cloud/nearest_failure.hpp"
 #include "families/fracture/bond_monitor.hpp"
 #include "perikit/core/simd.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "families/cloud/cloud_families.hpp"
 #include "families/cloud/cloud_row_simd.hpp"
-#include "terms/bond_energy_split.hpp"
+#include "terms/pairs/pair_energy_shares.hpp"
 #include "terms/pairs/pair_loop.hpp"
 
 namespace perikit {

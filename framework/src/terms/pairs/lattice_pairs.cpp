@@ -10,7 +10,7 @@
 
 #include "families/lattice/lattice_families.hpp"
 #include "spaces/lattice/work_of_groups.hpp"
-#include "terms/bond_energy_split.hpp"
+#include "terms/pairs/pair_energy_shares.hpp"
 #include "terms/pairs/pair_loop.hpp"
 
 namespace perikit {
@@ -39,9 +39,9 @@ class LatticePairs final : public PairLoop {
     std::vector<std::uint16_t> all(families_.slots.size());
     std::iota(all.begin(), all.end(), std::uint16_t{0});
     FamilyArrays family;
-    AlignedVector<double> share;
     families_.load(all, family);
-    energy_shares(parts.formulation, D, family, share);
+    AlignedVector<double> share(family.size, 1.0);
+    pair_energy_shares(law_, family.bonds, family.length.data(), family.omega.data(), share.data());
     for (std::size_t s = 0; s < all.size(); ++s) inverse_share_.push_back(share[s] > 0 ? 1 / share[s] : 0.0);
     find_needed();
     length_.resize(length_.size() + batch_points, 1.0);

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/dimension.hpp"
-#include "families/fracture/bond_finder.hpp"
+#include "families/bond_stretch.hpp"
 #include "perikit/core/warnings.hpp"
 #include "terms/family_point.hpp"
 #include "terms/pairs/pair_assembly.hpp"

@@ -8,8 +8,8 @@
 #include <type_traits>
 
 #include "families/blocks.hpp"
+#include "families/cloud/nearest_failure.hpp"
 #include "families/families.hpp"
-#include "families/fracture/bond_monitor.hpp"
 #include "families/resting_blocks.hpp"
 #include "families/stretch.hpp"
 #include "model/formulation.hpp"
