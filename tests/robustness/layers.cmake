@@ -5,7 +5,7 @@
 #
 cmake_minimum_required(VERSION 3.25)
 
-# One name for the headers of include/perikit/<folder> and the sources of src/<folder>. "folder/file" places single files apart.
+# One name for the headers of include/perikit/<folder> and the sources of src/<folder>. "folder/file" and "folder/sub-folder" are placed apart.
 set(order
     core              # memory, threads, vectors of numbers, errors
     files             # files that appear whole, HDF5
@@ -20,12 +20,15 @@ set(order
     cloud_balance     # weights and shifts that balance a constant stress on clouds
     assembly          # the tangent as a matrix
     terms             # what adds to forces, energy and tangent
+    fracture          # which bonds fail, when, and what that does
+    terms/terms       # the sum of all terms
     problem           # state, constraints, loads
     output_fields     # fields of points by name
     sdk               # what parts are written with: laws, equilibrium, load steps
     plugin/registry   # makes parts of every kind, so it knows the interfaces of all of them
     scene             # what a file says
     output            # what is written
+    fracture/limits   # limits of bonds, from a scene
     setup             # makes bodies, models and problems from scenes
     warnings          # what may be wrong in a scene, a body, a model
     run               # one run
@@ -45,12 +48,12 @@ function(place_of path variable)
     set(${variable} ${place} PARENT_SCOPE)
     return()
   endif()
-  string(REGEX MATCH "^[^/]+" folder ${path})
   string(REGEX REPLACE "\\.[a-z]+$" "" stem ${path})
-  list(FIND order ${stem} place)
-  if(place LESS 0)
-    list(FIND order ${folder} place)
-  endif()
+  set(place -1)
+  while(place LESS 0 AND stem)   # the file, else the innermost folder that has a place
+    list(FIND order ${stem} place)
+    string(REGEX REPLACE "/?[^/]+$" "" stem ${stem})
+  endwhile()
   if(place LESS 0)
     message(FATAL_ERROR "${path}: the folder has no place in the order of tests/robustness/layers.cmake")
   endif()

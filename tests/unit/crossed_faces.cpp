@@ -1,6 +1,6 @@
 /// Faces of a crack: what closes them beyond what the body does counts; opening, sliding, turning and homogeneous strain do not.
 
-#include "problem/crossed_faces.hpp"
+#include "problem/bonds/crossed_faces.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 /// What a crack takes by `critical_energy`, summed up without a run: the limits of all bonds that cross a unit of area of a plane, over Gc. On lattices
 /// it is 1 for planes along the lattice, whatever the influence function and its factor; elsewhere within the bounds of framework/docs/fracture.md.
 
-#include "setup/crossing_bonds.hpp"
+#include "fracture/limits/crossing_bonds.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -12,8 +12,8 @@
 #include <numbers>
 #include <random>
 
+#include "fracture/search/bond_energy_split.hpp"
 #include "scene/scene.hpp"
-#include "terms/bond_energy_split.hpp"
 #include "tests/kit/registry.hpp"
 
 using namespace perikit;

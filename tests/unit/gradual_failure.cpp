@@ -1,6 +1,6 @@
 /// Bonds that let go in several steps, by hand.
 
-#include "families/fracture/gradual_failure.hpp"
+#include "fracture/gradual_failure.hpp"
 
 #include <doctest/doctest.h>
 

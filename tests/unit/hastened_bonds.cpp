@@ -1,6 +1,6 @@
 /// Bonds that weaken from round to round, by hand.
 
-#include "families/fracture/aitken_acceleration.hpp"
+#include "fracture/aitken_acceleration.hpp"
 
 #include <doctest/doctest.h>
 

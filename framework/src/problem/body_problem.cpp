@@ -9,12 +9,12 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
+#include "problem/bonds/crossed_faces.hpp"
+#include "problem/bonds/near_bonds.hpp"
 #include "problem/companion.hpp"
-#include "problem/crossed_faces.hpp"
-#include "problem/surroundings/image_gradients.hpp"
 #include "problem/loose/loose_points.hpp"
 #include "problem/loose/weak_springs.hpp"
-#include "problem/near_bonds.hpp"
+#include "problem/surroundings/image_gradients.hpp"
 
 namespace perikit {
 

@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cctype>
 
+#include "fracture/failure_energy.hpp"
 #include "model/formulation.hpp"
 #include "perikit/core/warnings.hpp"
 #include "scene/expressions/expression_names.hpp"
 #include "scene/sections.hpp"
 #include "scene/toml/toml_text.hpp"
-#include "terms/failure_energy.hpp"
 
 namespace perikit {
 

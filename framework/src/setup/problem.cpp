@@ -9,6 +9,7 @@
 
 #include "cloud_balance/consistency.hpp"
 #include "families/families.hpp"
+#include "fracture/limits/damage.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "perikit/core/warnings.hpp"
 #include "setup/body/body.hpp"
@@ -16,7 +17,6 @@
 #include "setup/body/several_ranks.hpp"
 #include "setup/body/thin_pieces.hpp"
 #include "setup/conditions.hpp"
-#include "setup/damage.hpp"
 #include "setup/doubts_of_body.hpp"
 #include "setup/gradient_order.hpp"
 #include "setup/laminate_interfaces.hpp"

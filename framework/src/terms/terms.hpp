@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "families/bonds.hpp"
-#include "families/step_inside.hpp"
+#include "fracture/step_inside.hpp"
 #include "model/formulation.hpp"
 #include "operators/group_energy.hpp"
 #include "operators/material_points.hpp"

@@ -3,7 +3,7 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/errors.hpp"
-#include "problem/fracture/fracture_record.hpp"
+#include "problem/bonds/fracture_record.hpp"
 #include "problem/saved/history_record.hpp"
 
 namespace perikit {

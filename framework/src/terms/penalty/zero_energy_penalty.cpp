@@ -15,7 +15,7 @@ void ZeroEnergyPenalty::take(std::size_t p, double energy, const Wanted& wanted)
 
 /// The penalty of a point belongs to its bonds as the rest of its energy does. It is no stress.
 void ZeroEnergyPenalty::add_bonds(const Configuration& at, const Region& region, BondSamples& samples) {
-  if (samples.what() == BondSampling::derivative) return;  // terms/bond_release.hpp knows what it does
+  if (samples.what() == BondSampling::derivative) return;  // fracture/search/bond_release.hpp knows what it does
   const Body& body = parts_.families.body();
   Field density = body.make_field(1);
   add_density(at.u(), density.data(), region.only());

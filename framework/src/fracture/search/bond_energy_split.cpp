@@ -1,4 +1,4 @@
-#include "terms/bond_energy_split.hpp"
+#include "fracture/search/bond_energy_split.hpp"
 
 #include <algorithm>
 

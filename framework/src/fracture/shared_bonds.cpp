@@ -1,4 +1,4 @@
-#include "families/fracture/shared_bonds.hpp"
+#include "fracture/shared_bonds.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "problem/near_bonds.hpp"
+#include "problem/bonds/near_bonds.hpp"
 
 #include <algorithm>
 #include <array>

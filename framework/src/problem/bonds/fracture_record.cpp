@@ -1,4 +1,4 @@
-#include "problem/fracture/fracture_record.hpp"
+#include "problem/bonds/fracture_record.hpp"
 
 #include <fmt/format.h>
 

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "families/families.hpp"
-#include "families/fracture/bond_copies.hpp"
-#include "families/fracture/bond_finder.hpp"
+#include "fracture/bond_copies.hpp"
+#include "fracture/search/bond_finder.hpp"
+#include "fracture/search/bond_release.hpp"
 #include "model/formulation.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/bond_screen.hpp"
-#include "terms/bond_release.hpp"
 #include "terms/term.hpp"
 
 namespace perikit {

@@ -1,4 +1,4 @@
-#include "families/fracture/fracture.hpp"
+#include "fracture/fracture.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <map>
 
 #include "core/each_once.hpp"
-#include "families/fracture/bond_copies.hpp"
+#include "fracture/bond_copies.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/rank_values.hpp"

@@ -1,4 +1,4 @@
-#include "problem/crossed_faces.hpp"
+#include "problem/bonds/crossed_faces.hpp"
 
 #include <algorithm>
 #include <array>

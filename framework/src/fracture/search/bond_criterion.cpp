@@ -1,4 +1,4 @@
-#include "terms/bond_criterion.hpp"
+#include "fracture/search/bond_criterion.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include "core/each_once.hpp"
 #include "families/bond_stretch.hpp"
 #include "families/cloud/cloud_families.hpp"
+#include "fracture/search/bond_energy_split.hpp"
 #include "perikit/core/parallel.hpp"
-#include "terms/bond_energy_split.hpp"
 
 namespace perikit {
 

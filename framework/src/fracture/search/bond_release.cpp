@@ -1,4 +1,4 @@
-#include "terms/bond_release.hpp"
+#include "fracture/search/bond_release.hpp"
 
 #include <algorithm>
 #include <cmath>

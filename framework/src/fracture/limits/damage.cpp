@@ -1,4 +1,4 @@
-#include "setup/damage.hpp"
+#include "fracture/limits/damage.hpp"
 
 #include <fmt/format.h>
 
@@ -11,11 +11,11 @@
 
 #include "body/interfaces.hpp"
 #include "families/families.hpp"
-#include "families/fracture/bond_copies.hpp"
+#include "fracture/bond_copies.hpp"
+#include "fracture/limits/crossing_bonds.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/warnings.hpp"
 #include "problem/ghosts.hpp"
-#include "setup/crossing_bonds.hpp"
 
 namespace perikit {
 

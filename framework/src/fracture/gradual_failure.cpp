@@ -1,4 +1,4 @@
-#include "families/fracture/gradual_failure.hpp"
+#include "fracture/gradual_failure.hpp"
 
 #include <cmath>
 

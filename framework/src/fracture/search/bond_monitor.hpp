@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "families/bonds.hpp"
-#include "families/fracture/bond_finder.hpp"
+#include "fracture/search/bond_finder.hpp"
 #include "perikit/body/body.hpp"
 #include "perikit/core/parallel.hpp"
 

@@ -1,4 +1,4 @@
-#include "setup/crossing_bonds.hpp"
+#include "fracture/limits/crossing_bonds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "families/regular_family.hpp"
+#include "fracture/search/bond_energy_split.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "problem/ghosts.hpp"
-#include "terms/bond_energy_split.hpp"
 
 namespace perikit {
 

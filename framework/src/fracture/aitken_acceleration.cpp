@@ -1,4 +1,4 @@
-#include "families/fracture/aitken_acceleration.hpp"
+#include "fracture/aitken_acceleration.hpp"
 
 #include <algorithm>
 

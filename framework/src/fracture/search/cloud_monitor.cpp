@@ -7,7 +7,7 @@
 #include "families/cloud/cloud_families.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "families/cloud/nearest_failure.hpp"
-#include "families/fracture/bond_monitor.hpp"
+#include "fracture/search/bond_monitor.hpp"
 #include "perikit/core/simd.hpp"
 
 namespace perikit {

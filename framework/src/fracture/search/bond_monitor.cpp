@@ -1,4 +1,4 @@
-#include "families/fracture/bond_monitor.hpp"
+#include "fracture/search/bond_monitor.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "families/families.hpp"
-#include "families/fracture/aitken_acceleration.hpp"
-#include "families/fracture/bond_finder.hpp"
-#include "families/fracture/gradual_failure.hpp"
-#include "families/fracture/shared_bonds.hpp"
-#include "families/step_inside.hpp"
+#include "fracture/aitken_acceleration.hpp"
+#include "fracture/gradual_failure.hpp"
+#include "fracture/search/bond_finder.hpp"
+#include "fracture/shared_bonds.hpp"
+#include "fracture/step_inside.hpp"
 
 namespace perikit {
 

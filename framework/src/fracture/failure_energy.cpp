@@ -1,4 +1,4 @@
-#include "terms/failure_energy.hpp"
+#include "fracture/failure_energy.hpp"
 
 namespace perikit {
 

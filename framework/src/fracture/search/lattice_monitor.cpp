@@ -5,9 +5,9 @@
 #include <tuple>
 
 #include "core/each_once.hpp"
-#include "families/fracture/bond_monitor.hpp"
 #include "families/lattice/lattice_families.hpp"
 #include "families/stretch.hpp"
+#include "fracture/search/bond_monitor.hpp"
 
 namespace perikit {
 

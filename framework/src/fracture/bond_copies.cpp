@@ -1,4 +1,4 @@
-#include "families/fracture/bond_copies.hpp"
+#include "fracture/bond_copies.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-// Bonds of bodies with images: the first of its copies stands for a bond (families/fracture/bond_copies.hpp).
+// Bonds of bodies with images: the first of its copies stands for a bond (fracture/bond_copies.hpp).
 #include <algorithm>
 #include <utility>
 
 #include "core/each_once.hpp"
 #include "families/bond_stretch.hpp"
-#include "terms/bond_criterion.hpp"
+#include "fracture/search/bond_criterion.hpp"
 
 namespace perikit {
 
