@@ -10,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "fracture/search/bond_criterion.hpp"
 #include "tests/contract/bonds_that_fail.hpp"
 #include "tests/contract/integrator_fixture.hpp"
 #include "tests/contract/reference_body.hpp"
@@ -41,14 +42,14 @@ std::set<std::pair<std::int32_t, std::int32_t>> fail_screened_or_not(BodyOptions
   const auto screened = build(text), unscreened = build(text), slow = build(scene_text(options, kinematics));
   respond(screened->problem(), 23);
   const FieldView u = screened->problem().state().displacement();
-  const BondUpdate update = screened->problem().terms().update_bonds({u, 0});
+  const BondUpdate update = screened->problem().fracture()->update({u, 0}, 0);
   CHECK(update.changed > 0);
   CHECK(update.changed < bonds);
   std::set<std::pair<std::int32_t, std::int32_t>> failed;
-  for (const BondChange& b : screened->problem().terms().changed_bonds()) failed.emplace(b.bond.point, b.bond.far);
+  for (const BondChange& b : screened->problem().families().changed()) failed.emplace(b.bond.point, b.bond.far);
   for (auto* other : {unscreened.get(), slow.get()}) {
-    CHECK(other->problem().terms().update_bonds({u, 0}).changed == update.changed);
-    for (const BondChange& b : other->problem().terms().changed_bonds()) CHECK(failed.contains({b.bond.point, b.bond.far}));
+    CHECK(other->problem().fracture()->update({u, 0}, 0).changed == update.changed);
+    for (const BondChange& b : other->problem().families().changed()) CHECK(failed.contains({b.bond.point, b.bond.far}));
   }
   return failed;
 }
@@ -65,7 +66,7 @@ TEST_CASE("kinematics: bonds share the stored energy, and those that hold the mo
         const auto plain = build(scene_text(options, kinematics_table(example)));
         const double whole = respond(plain->problem(), 23);
         const Body& body = plain->problem().body();
-        const std::vector<BondEnergy> shares = plain->problem().terms().bond_energies({plain->problem().state().displacement(), 0});
+        const std::vector<BondEnergy> shares = bond_energies(plain->problem().terms(), {plain->problem().state().displacement(), 0});
         double sum = 0;
         std::vector<double> densities;
         const auto density = [&](const BondEnergy& b) {
@@ -122,24 +123,24 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
         const FieldView u = problem.state().displacement();
         const bool higher = formulation.order > 1, parts = formulation.weighted && formulation.parts(d) > 0;
         if (formulation.pairs || (higher && (formulation.selective() || !example.stabilization.empty())) || (parts && formulation.selective())) {
-          CHECK_THROWS_AS(problem.terms().released_energies({u, 0}), std::logic_error);
+          CHECK_THROWS_AS(bond_energies(problem.terms(), {u, 0}, true), std::logic_error);
           continue;
         }
         // Some bonds have weakened.
-        std::vector<BondEnergy> released = problem.terms().released_energies({u, 0});
+        std::vector<BondEnergy> released = bond_energies(problem.terms(), {u, 0}, true);
         std::mt19937_64 random(7);
         std::vector<BondChange> state;
         for (std::size_t k = 0; k < released.size(); k += 1 + random() % 3)
           state.push_back({released[k].bond, 0.4 + 0.5 * static_cast<double>(random() % 1000) / 1000});
-        problem.terms().restore_bonds(state);
-        released = problem.terms().released_energies({u, 0});
+        problem.fracture()->restore(state);
+        released = bond_energies(problem.terms(), {u, 0}, true);
         double most = 0;
         for (const BondEnergy& b : released) most = std::max(most, std::abs(b.energy));
         Field force = problem.make_field();
         const auto energy_with = [&](std::size_t k, double b) {
           std::vector<BondChange> changed = state;
           changed[k].integrity = b;
-          problem.terms().restore_bonds(changed);
+          problem.fracture()->restore(changed);
           double energy = 0;
           REQUIRE(problem.evaluate_forces({u, 0}, force, &energy).ok());
           return energy;
@@ -157,9 +158,9 @@ TEST_CASE("kinematics: what a bond sets free is the derivative of the stored ene
         }
         // Bonds break at once by it, as many whether the others are looked at or not.
         const Body& body = problem.body();
-        problem.terms().restore_bonds({});
+        problem.fracture()->restore({});
         std::vector<double> densities;
-        for (const BondEnergy& b : problem.terms().released_energies({u, 0}))
+        for (const BondEnergy& b : bond_energies(problem.terms(), {u, 0}, true))
           densities.push_back(b.energy / (body.volume(static_cast<std::size_t>(b.bond.point)) * body.volume(static_cast<std::size_t>(b.bond.far))));
         std::ranges::sort(densities);
         // Between two of them: what is found from the forces that are there is the same but for rounding.
@@ -201,8 +202,8 @@ TEST_CASE("kinematics: bonds fail by the largest principal stress, that of the m
           const auto simulation = build(scene_text(options, kinematics_table(example)));
           stretch(simulation->problem());
           const std::size_t bonds =
-              simulation->problem().terms().bond_energies({simulation->problem().state().displacement(), 0}).size();
-          const BondUpdate update = simulation->problem().terms().update_bonds({simulation->problem().state().displacement(), 0});
+              bond_energies(simulation->problem().terms(), {simulation->problem().state().displacement(), 0}).size();
+          const BondUpdate update = simulation->problem().fracture()->update({simulation->problem().state().displacement(), 0}, 0);
           CHECK(update.changed == (share > 1 ? 0 : bonds));
         }
       }

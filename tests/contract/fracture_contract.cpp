@@ -170,9 +170,9 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         CHECK(difference(body, before.force, plain.force) == 0);
         CHECK(before.energy == plain.energy);
         part_at(body, problem.state().displacement(), height);
-        const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
-        CHECK(2 * update.changed == cut->problem().terms().report().broken_bonds);
-        CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).changed == 0);
+        const BondUpdate update = problem.fracture()->update({problem.state().displacement(), 0}, 0);
+        CHECK(2 * update.changed == cut->problem().report().broken_bonds);
+        CHECK(problem.fracture()->update({problem.state().displacement(), 0}, 0).changed == 0);
         const Response after = respond(problem, 6);
         const bool selective = formulation_of(example).selective();
         const std::optional<Response> expected = selective ? dense_response(*failing, height) : respond(cut->problem(), 6);
@@ -186,8 +186,8 @@ TEST_CASE("kinematics: a body whose bonds have failed is the body that was built
         for (const std::int32_t p : body.internal()) CHECK(std::abs(damage.data()[p] - cut_damage.data()[p]) <= 1e-12);
         // At rest again, and closed: nothing heals.
         set_field(body, problem.state().displacement(), [](const Point&) { return Point{}; });
-        CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).changed == 0);
-        CHECK(problem.terms().changed_bonds().size() == update.changed);
+        CHECK(problem.fracture()->update({problem.state().displacement(), 0}, 0).changed == 0);
+        CHECK(problem.families().changed().size() == update.changed);
       }
 }
 
@@ -208,7 +208,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         const auto intact = respond(problem, 11);
-        const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
+        const BondUpdate update = problem.fracture()->update({problem.state().displacement(), 0}, 0);
         CHECK(update.changed > 0);
         Response r = respond(problem, 11);
         CHECK(std::abs(intact.energy - r.energy - update.dissipated) <= 1e-11 * intact.energy);
@@ -220,7 +220,7 @@ TEST_CASE("kinematics: released energy, momentum, symmetry and restoring of bond
         // No bond of a protected point failed, and every failed one is named once.
         const std::set<std::int32_t> safe(body.set("part").begin(), body.set("part").end());
         std::set<std::pair<std::int32_t, std::int32_t>> named;
-        for (const BondChange& b : problem.terms().changed_bonds()) {
+        for (const BondChange& b : problem.families().changed()) {
           CHECK((!safe.contains(b.bond.point) && !safe.contains(b.bond.far)));
           CHECK(b.integrity == 0);
           CHECK(b.bond.point < b.bond.far);
@@ -307,7 +307,7 @@ TEST_CASE("kinematics: linear and angular momentum stay in every step in which b
             simulation->run(watch);
           } catch (const RunError&) {   // a body that bursts may turn inside out; until then everything holds
           }
-          failed += problem.terms().changed_bonds().size();
+          failed += problem.families().changed().size();
           CHECK(drift <= 1e-12);
           if (d > 1 && example.keeps_angular_momentum) CHECK(turn <= 1e-12);
         }
@@ -358,7 +358,7 @@ Stayed stay(const std::string& kinematics, const std::string& damage, const Arra
   Watch watch(simulation);
   simulation.run(watch);
   BodyProblem& problem = simulation.problem();
-  Stayed stayed{std::vector<double>(2 * points.size()), problem.fracture_summary().find("bonds held") != std::string::npos, problem.terms().changed_bonds().size()};
+  Stayed stayed{std::vector<double>(2 * points.size()), problem.fracture_summary().find("bonds held") != std::string::npos, problem.families().changed().size()};
   const ConstFieldView u = problem.state().displacement();
   for (const std::int32_t p : problem.body().internal()) {
     const std::size_t k = order[static_cast<std::size_t>(problem.body().number(static_cast<std::size_t>(p)))];
@@ -435,8 +435,8 @@ TEST_CASE("kinematics: with the second law no bonds fail that would raise the en
           BodyProblem& problem = lawful->problem();
           const Response intact = noise(problem);
           noise(lawless->problem());
-          const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0}),
-                           any = lawless->problem().terms().update_bonds({lawless->problem().state().displacement(), 0});
+          const BondUpdate update = problem.fracture()->update({problem.state().displacement(), 0}, 0),
+                           any = lawless->problem().fracture()->update({lawless->problem().state().displacement(), 0}, 0);
           CHECK(update.dissipated >= 0);
           held += update.held;
           CHECK(any.held == 0);
@@ -446,8 +446,8 @@ TEST_CASE("kinematics: with the second law no bonds fail that would raise the en
           // What raises the energy somewhere is held, and nothing where nothing does. Bonds that are tried again still would.
           if (any.dissipated < 0) CHECK(update.held > 0);
           if (update.held == 0)
-            CHECK(problem.terms().changed_bonds().size() == lawless->problem().terms().changed_bonds().size());
-          const BondUpdate again = problem.terms().update_bonds({problem.state().displacement(), 0});
+            CHECK(problem.families().changed().size() == lawless->problem().families().changed().size());
+          const BondUpdate again = problem.fracture()->update({problem.state().displacement(), 0}, 0);
           CHECK(again.dissipated >= 0);
           CHECK((again.changed + again.held > 0) == (update.held > 0));
           // Bonds that were taken back are as if they had never been lowered.
@@ -484,8 +484,8 @@ TEST_CASE("kinematics: weakened bonds: force = -dE/du, exact tangents, affine mo
         const Body& body = problem.body();
         CHECK((body.lattice() != nullptr) == !cloud);   // lattices stay what they are
         const Response intact = respond(problem, 17);
-        const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
-        const BondChecks checks = problem.terms().bond_checks();
+        const BondUpdate update = problem.fracture()->update({problem.state().displacement(), 0}, 0);
+        const BondChecks checks = problem.fracture()->checks();
         CHECK(checks.weakened > 0);
         CHECK(checks.failed > 0);
         const Response left = respond(problem, 17);
@@ -531,11 +531,11 @@ TEST_CASE("kinematics: bonds fail under laws with history: released energy, mome
         };
         walk(problem, 18, false);
         problem.advance(step);
-        const std::size_t before = problem.terms().changed_bonds().size();
+        const std::size_t before = problem.families().changed().size();
         const Response intact = walk(problem, 19, true);
         const double dissipated = problem.state().energies.dissipated;
         problem.advance(step);
-        CHECK(problem.terms().changed_bonds().size() > before);
+        CHECK(problem.families().changed().size() > before);
         Response left{0, problem.make_field()};
         REQUIRE(problem.evaluate_forces({problem.state().displacement(), 0}, left.force, &left.energy).ok());
         CHECK(std::abs(intact.energy - left.energy - (problem.state().energies.dissipated - dissipated)) <= 1e-11 * std::abs(intact.energy));
@@ -566,14 +566,14 @@ TEST_CASE("kinematics: where most bonds fail every point has a gradient or is a 
           BodyProblem& problem = simulation->problem();
           const Body& body = problem.body();
           const Response intact = respond(problem, 13);
-          const BondUpdate update = problem.terms().update_bonds({problem.state().displacement(), 0});
+          const BondUpdate update = problem.fracture()->update({problem.state().displacement(), 0}, 0);
           const Response left = respond(problem, 13);
           // Bonds of fragments are accounted for like the others, and named once.
           CHECK(std::abs(intact.energy - left.energy - update.dissipated) <= 1e-11 * intact.energy);
           std::set<std::pair<std::int32_t, std::int32_t>> named;
-          for (const BondChange& b : problem.terms().changed_bonds()) CHECK(named.emplace(b.bond.point, b.bond.far).second);
+          for (const BondChange& b : problem.families().changed()) CHECK(named.emplace(b.bond.point, b.bond.far).second);
           CHECK(named.size() == update.changed);
-          CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).changed == 0);
+          CHECK(problem.fracture()->update({problem.state().displacement(), 0}, 0).changed == 0);
           for (int c = 0; c < d; ++c) CHECK(std::abs(total(body, left.force, c)) <= 1e-12 * static_cast<double>(body.points()) * largest(body, left.force));
           // No family is left near singular: 0.1 of an intact one, whose condition is below 20, in its weakest direction.
           const Field condition = problem.terms().shape_tensor_condition(), damage = problem.terms().damage();
@@ -616,7 +616,7 @@ TEST_CASE("kinematics: forces and energies that are renewed near failed bonds ar
         for (const std::int32_t p : body.internal())
           if (off(p) < off(torn)) torn = p;
         u.component(d - 1)[torn] += d == 1 ? 0.9 : 1.7;
-        const BondUpdate update = problem.terms().update_bonds({u, 0});
+        const BondUpdate update = problem.fracture()->update({u, 0}, 0);
         CHECK(update.changed > 0);
         const std::vector<std::int32_t> moved{torn};
         const EvaluationStatus renewed = problem.terms().renew_forces({u, 0}, moved, update.ends, force, &energy),
@@ -666,7 +666,7 @@ TEST_CASE("kinematics: stretches are those of bonds between neighbours that have
       // Half of the body flies away: no bond holds it.
       set_field(body, u, [](const Point& x) { return Point{x[0] < 4.5 ? 0.0 : 50.0, 0, 0}; });
       CHECK(problem.stretches(u).largest > 10);
-      CHECK(problem.terms().update_bonds({u, 0}).changed > 0);
+      CHECK(problem.fracture()->update({u, 0}, 0).changed > 0);
       range(1, 1);
     }
 }
@@ -681,7 +681,7 @@ TEST_CASE("kinematics: points without bonds are free masses") {
         BodyProblem& problem = simulation->problem();
         const Body& body = problem.body();
         set_field(body, problem.state().displacement(), [](const Point& x) { return Point{5 * x[0], 5 * x[1], 5 * x[2]}; });
-        CHECK(problem.terms().update_bonds({problem.state().displacement(), 0}).dissipated > 0);
+        CHECK(problem.fracture()->update({problem.state().displacement(), 0}, 0).dissipated > 0);
         // Wherever they fly, even onto each other.
         set_field(body, problem.state().displacement(), [](const Point& x) { return Point{-x[0], -x[1], -x[2]}; });
         Field force = problem.body().make_field(d);
@@ -703,9 +703,9 @@ TEST_CASE("kinematics: a scene without damage pays nothing") {
       const auto plain = build(scene_text(options, kinematics_table(example)));
       options.conditions = limit_of_stretch;
       const auto failing = build(scene_text(options, kinematics_table(example)));
-      CHECK(plain->problem().terms().report().bytes < failing->problem().terms().report().bytes);
-      CHECK(plain->problem().terms().update_bonds({plain->problem().state().displacement(), 0}).changed == 0);
-      CHECK(plain->problem().terms().bond_checks().updates == 0);
+      CHECK(plain->problem().report().bytes < failing->problem().report().bytes);
+      CHECK(plain->problem().fracture() == nullptr);
+      CHECK(!plain->problem().update_bonds({plain->problem().state().displacement(), 0}, 0));
       CHECK(plain->problem().fracture_summary().empty());
     }
 }

@@ -239,7 +239,7 @@ TEST_CASE("kinematics: rate laws evaluate symmetric bonds once: the same forces 
           const auto once = build(scene_text(body, kinematics_table(example)));
           body.share = false;
           const auto twice = build(scene_text(body, kinematics_table(example)));
-          CHECK(2 * once->problem().terms().report().evaluation_points == twice->problem().terms().report().evaluation_points);
+          CHECK(2 * once->problem().report().evaluation_points == twice->problem().report().evaluation_points);
           CHECK_MESSAGE((d == 1 || mixed || formulation_of(example).selective() || kept(once->problem()).size() < 0.7 * static_cast<double>(kept(twice->problem()).size())),
                         "both ends keep a history of their own");
           const Response a = walk(once->problem()), b = walk(twice->problem());
@@ -280,7 +280,7 @@ TEST_CASE("kinematics: rate laws leave out what no wave has reached, and not a b
           all->problem().advance(step);
         }
         CHECK(kept(some->problem()) == kept(all->problem()));
-        CHECK(some->problem().terms().report().resting.quiet > 0);
-        CHECK(all->problem().terms().report().resting.blocks == 0);
+        CHECK(some->problem().report().resting.quiet > 0);
+        CHECK(all->problem().report().resting.blocks == 0);
       }
 }

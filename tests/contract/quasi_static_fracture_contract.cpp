@@ -51,7 +51,7 @@ using Bonds = std::map<std::pair<std::int32_t, std::int32_t>, double>;
 /// Integrity of the bonds that have failed, by their ends.
 Bonds failed(const BodyProblem& problem) {
   Bonds bonds;
-  for (const BondChange& b : problem.terms().changed_bonds())
+  for (const BondChange& b : problem.families().changed())
     bonds[{b.bond.point, b.bond.far}] = b.integrity;
   return bonds;
 }
@@ -158,7 +158,7 @@ TEST_CASE(
         CHECK(failing > 3);
         CHECK(std::any_of(known.begin(), known.end(), [](const auto& bond) { return bond.second == 0; }));
         CHECK(std::any_of(known.begin(), known.end(), [](const auto& bond) { return bond.second > 0; }) == !bits);
-        CHECK(known.size() < problem.terms().report().bonds / 4);
+        CHECK(known.size() < problem.report().bonds / 4);
         const Energies& e = problem.state().energies;
         CHECK(e.dissipated > 0);
         CHECK_MESSAGE(std::abs(e.external_work - e.strain - e.dissipated) <= 0.01 * e.external_work, "work ", e.external_work,
@@ -198,7 +198,7 @@ TEST_CASE("integrator: a quasi-static run with failing bonds that is stopped goe
       Watch watch(*whole);
       std::size_t before = 0;
       watch.each = [&](const StepReport& report) {
-        const std::size_t now = whole->problem().terms().changed_bonds().size();
+        const std::size_t now = whole->problem().families().changed().size();
         if (now > before) breaking.push_back(report.step);
         before = now;
       };

@@ -67,7 +67,7 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     pair.compare(rest, "at rest");
     pair.compare(left, "with one end moving");
     pair.compare(right, "with the other end moving");
-    const RestingCounts before = pair.some().terms().report().resting;
+    const RestingCounts before = pair.some().report().resting;
     for (BodyProblem* problem : {&pair.some(), &pair.all()}) {
       Field Kw = problem->make_field();
       REQUIRE(problem->tangent_action({right, 0}, left, Kw).ok());
@@ -79,8 +79,8 @@ TEST_CASE("kinematics: what no wave has reached is left out, and not a bit of th
     }
     pair.compare(right, "after a sample");
     pair.compare(rest, "back at rest");
-    const RestingCounts after = pair.some().terms().report().resting;
-    CHECK(pair.all().terms().report().resting.blocks == 0);
+    const RestingCounts after = pair.some().report().resting;
+    CHECK(pair.all().report().resting.blocks == 0);
     if (!c.conservative()) continue;
     const std::int64_t blocks = after.blocks - before.blocks, quiet = after.quiet - before.quiet;
     CHECK(blocks > 0);

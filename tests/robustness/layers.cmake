@@ -21,7 +21,6 @@ set(order
     assembly          # the tangent as a matrix
     terms             # what adds to forces, energy and tangent
     fracture          # which bonds fail, when, and what that does
-    terms/terms       # the sum of all terms
     problem           # state, constraints, loads
     output_fields     # fields of points by name
     sdk               # what parts are written with: laws, equilibrium, load steps

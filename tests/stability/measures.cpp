@@ -175,7 +175,7 @@ Spectrum Specimen::spectrum() {
   }
   Field rest = problem.body().make_field(d);
   result.estimate = largest_eigenvalue(problem, rest) / result.largest;
-  result.poor_points = problem.terms().report().singular_families;
+  result.poor_points = problem.report().singular_families;
   return result;
 }
 

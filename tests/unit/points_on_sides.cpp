@@ -87,7 +87,7 @@ class Bar {
     const ConstFieldView free = problem.constraints().free();
     for (const std::int32_t p : problem.body().owned())
       for (int c = 0; c < problem.dimension(); ++c) largest = std::max(largest, std::abs(force.component(c)[p] * free.component(c)[p]));
-    return {energy / (0.5 * 1e6 * strain * strain * volume), largest / (1e6 * strain), problem.terms().report().warnings.size()};
+    return {energy / (0.5 * 1e6 * strain * strain * volume), largest / (1e6 * strain), problem.report().warnings.size()};
   }
   const std::string& body() const { return body_; }
 

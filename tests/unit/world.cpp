@@ -231,5 +231,5 @@ TEST_CASE("world: what it cannot evaluate yet is refused") {
   between.push_back(std::make_unique<Driven>());
   CHECK_THROWS_AS(World({{"plate", &two.plate->terms()}, {"cloud", &two.cloud->terms()}}, std::move(between)), std::invalid_argument);
   const std::unique_ptr<BodyProblem> brittle = body_of("bond_based", false, "[damage]\ntype = \"critical_stretch\"\nstretch = 0.05");
-  CHECK_THROWS_AS(World({{"brittle", &brittle->terms()}, {"cloud", &two.cloud->terms()}}), std::invalid_argument);
+  CHECK_THROWS_AS(World({{"brittle", &brittle->terms(), brittle->fracture()}, {"cloud", &two.cloud->terms()}}), std::invalid_argument);
 }

@@ -91,7 +91,7 @@ TEST_CASE("bond Jacobian: what weakening bonds add to the tangent is the derivat
         REQUIRE(problem.advance(0));
         CHECK_FALSE(bonds->any());  // nothing is known of their falls in the first round
         REQUIRE(bonds->add_tangent({u, 0}, w, Kw).ok());
-        const std::vector<BondChange> weakened = problem.terms().changed_bonds();
+        const std::vector<BondChange> weakened = problem.families().changed();
         REQUIRE(weakened.size() > 5);
         constexpr double step = 1e-5;
         for (const double sign : {1.0, -1.0}) {
@@ -101,7 +101,7 @@ TEST_CASE("bond Jacobian: what weakening bonds add to the tangent is the derivat
             CHECK(b.integrity == doctest::Approx(left_at(stretch(body, u, b.bond), onset, failure, beta)).epsilon(1e-12));
             follow.push_back({b.bond, b.integrity > 0 ? left_at(stretch(body, at, b.bond), onset, failure, beta) : 0.0});
           }
-          problem.terms().restore_bonds(follow);
+          problem.fracture()->restore(follow);
           REQUIRE(problem.evaluate_forces({u, 0}, sign > 0 ? ahead : behind, nullptr).ok());
         }
         Field difference = problem.make_field();

@@ -193,7 +193,7 @@ TEST_CASE("extremes: millimetres, newtons and tonnes give what metres, newtons a
         CHECK(most > 0);
         CHECK_MESSAGE(difference <= 1e-10 * most, "relative difference ", difference / most);
         if (damage) {
-          const auto broken = [](Simulation& s) { return s.problem().terms().changed_bonds().size(); };
+          const auto broken = [](Simulation& s) { return s.problem().families().changed().size(); };
           CHECK(broken(*a) > 0);
           CHECK(broken(*a) == broken(*b));
         }
@@ -333,7 +333,7 @@ TEST_CASE("extremes: a body whose bonds all fail within a step flies apart with 
       run(*simulation);
       BodyProblem& problem = simulation->problem();
       const Energies& energies = problem.state().energies;
-      CHECK(problem.terms().changed_bonds().size() > 0);
+      CHECK(problem.families().changed().size() > 0);
       CHECK(energies.strain <= 1e-9 * energies.kinetic);
       double flight = 0;  // each point goes on as it began
       for (const std::int32_t p : problem.body().owned()) {

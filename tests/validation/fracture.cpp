@@ -134,7 +134,7 @@ TEST_CASE("crack in a strip: what bonds set free follows from the forces that ar
   const RunEnergies some = run(*found), every = run(*anew);
   CHECK(some.dissipated > 0);
   CHECK(some.dissipated == doctest::Approx(every.dissipated).epsilon(1e-9));
-  CHECK(found->problem().terms().bond_checks().failed == anew->problem().terms().bond_checks().failed);
+  CHECK(found->problem().fracture()->checks().failed == anew->problem().fracture()->checks().failed);
 }
 
 TEST_CASE("mode I: a straight crack to the right edge, and nothing else") {
@@ -173,7 +173,7 @@ TEST_CASE("boundary tension: the energy balance holds to the end, whatever the n
   // The same bonds fail at the same steps when every bond is looked at in every step.
   const auto all = scene({"run.skip=false"});
   run(*all);
-  const BondChecks some = simulation->problem().terms().bond_checks(), every = all->problem().terms().bond_checks();
+  const BondChecks some = simulation->problem().fracture()->checks(), every = all->problem().fracture()->checks();
   CHECK(every.checked == every.groups);
   CHECK(some.checked < some.groups);
   CHECK(some.failed == every.failed);
@@ -188,7 +188,7 @@ TEST_CASE("boundary tension: on clouds the forces of pair laws say which bonds a
     const auto skipping = scene("true"), all = scene("false");
     run(*skipping);
     run(*all);
-    const BondChecks some = skipping->problem().terms().bond_checks(), every = all->problem().terms().bond_checks();
+    const BondChecks some = skipping->problem().fracture()->checks(), every = all->problem().fracture()->checks();
     INFO(kinematics);
     CHECK(every.checked == every.groups);
     CHECK(5 * some.checked < some.groups);   // 95 of 100 by margins alone
@@ -348,7 +348,7 @@ TEST_CASE("rubber sheet with selective: bonds that let go gradually dissipate, a
   CHECK(most_damage(whole->problem(), [](const Point& x) { return x[0] > 0.0165; }) > 0.25);
   CHECK(most_damage(whole->problem(), [](const Point& x) { return std::abs(x[1]) > 0.01; }) < 0.1);
   contract::run(*first, 3 * watch.reports.back().step / 4);
-  const BondChecks checks = first->problem().terms().bond_checks();
+  const BondChecks checks = first->problem().fracture()->checks();
   CHECK(checks.failed > 0);
   CHECK(checks.weakened > 0);
   second->problem().restore(first->problem().snapshot());

@@ -121,7 +121,7 @@ TEST_CASE("interfaces: what cannot be a laminate says so") {
   const auto note = [](const std::vector<std::string>& overrides) {
     const auto simulation = load("interfaces/bar.toml", overrides);
     std::string text;
-    for (const auto& [label, line] : simulation->problem().terms().report().notes)
+    for (const auto& [label, line] : simulation->problem().report().notes)
       if (label == "interfaces") text += line;
     return text;
   };

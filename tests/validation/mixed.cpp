@@ -193,8 +193,8 @@ TEST_CASE("bonds that fail: newton's solution and newton's bonds") {
              found = build(scene(2, 9, 1000, jfnk("mixed", 1e-9), "0", damage));
   run(*exact);
   run(*found);
-  CHECK(!exact->problem().terms().changed_bonds().empty());
-  CHECK(exact->problem().terms().changed_bonds().size() == found->problem().terms().changed_bonds().size());
+  CHECK(!exact->problem().families().changed().empty());
+  CHECK(exact->problem().families().changed().size() == found->problem().families().changed().size());
   CHECK(distance(*exact, *found) < 1e-6);
 }
 

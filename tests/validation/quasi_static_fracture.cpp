@@ -61,7 +61,7 @@ TEST_CASE("plate with a hole: cracks start at the hole's edge and run to the sid
     contract::WitnessProblem witness(problem);
     double first_at = 0, first_x = 0, first_radius = 0, peak = 0;
     witness.after = [&] {
-      if (first_radius > 0 || problem.terms().changed_bonds().empty()) return;
+      if (first_radius > 0 || problem.families().changed().empty()) return;
       const Field lost = problem.terms().damage();
       const std::int32_t worst =
           *std::max_element(body.internal().begin(), body.internal().end(),
@@ -118,7 +118,7 @@ TEST_CASE("the companion preconditioner loses its springs with the bonds: fewer 
                        "integrator={type=\"jfnk\",steps=15,tolerance=1e-8,preconditioner=\"companion\"}"},
                       2.5e-3);
   const Protocol protocol = run(*simulation);
-  CHECK(simulation->problem().terms().bond_checks().failed > 100);
+  CHECK(simulation->problem().fracture()->checks().failed > 100);
   int all = 0, most = 0;
   for (std::size_t at = protocol.text.find("gmres "); at != std::string::npos; at = protocol.text.find("gmres ", at + 1)) {
     const int iterations = std::atoi(&protocol.text[at + 6]);

@@ -108,9 +108,9 @@ TEST_CASE("skipping: points that no wave has reached are not evaluated, and the 
       Run some = run("true"), every = run("false");
       const std::vector<double> end = some.end(), expected = every.end();
       CHECK(end == expected);
-      const RestingCounts quiet = some.problem().terms().report().resting;
+      const RestingCounts quiet = some.problem().report().resting;
       CHECK_MESSAGE(quiet.quiet > quiet.blocks / 4, quiet.quiet, " of ", quiet.blocks, " blocks left out");
-      CHECK(every.problem().terms().report().resting.blocks == 0);
+      CHECK(every.problem().report().resting.blocks == 0);
       if (kinematics != "ordinary")
         CHECK_MESSAGE(some.counting.work.stresses < 0.75 * static_cast<double>(every.counting.work.stresses), some.counting.work.stresses.load(), " of ",
                       every.counting.work.stresses.load(), " evaluation points");
@@ -142,7 +142,7 @@ TEST_CASE("skipping: when bonds have failed, forces are renewed near them alone,
       Run some = run("true"), every = run("false");
       const std::vector<double> end = some.end(), expected = every.end();
       CHECK(end == expected);
-      CHECK(some.problem().terms().bond_checks().failed >= 18);
+      CHECK(some.problem().fracture()->checks().failed >= 18);
       // Points of a cloud are evaluated 64 at a time.
       if (some.counting.work.stresses > 0 && (jitter == "0.0" || kinematics.find("conventional") == std::string::npos))
         CHECK_MESSAGE(some.counting.work.stresses < every.counting.work.stresses, some.counting.work.stresses.load(), " of ",
@@ -198,10 +198,10 @@ TEST_CASE("skipping: the same bonds fail, bit for bit, whatever bonds fail by") 
     Run some(text, {"run.skip=true"}), every(text, {"run.skip=false"});
     const std::vector<double> end = some.end(), expected = every.end();
     CHECK(end == expected);
-    const BondChecks checks = some.problem().terms().bond_checks();
+    const BondChecks checks = some.problem().fracture()->checks();
     CHECK(checks.failed + checks.weakened > 0);
     const auto same = [](const BondChange& a, const BondChange& b) { return a.bond == b.bond && a.integrity == b.integrity; };
-    CHECK(std::ranges::equal(some.problem().terms().changed_bonds(), every.problem().terms().changed_bonds(), same));
+    CHECK(std::ranges::equal(some.problem().families().changed(), every.problem().families().changed(), same));
   }
 }
 
@@ -223,7 +223,7 @@ TEST_CASE("skipping: points held at rest have no forces beyond the reach of free
     const FieldView force = some.problem().state().internal_force(), same = every.problem().state().internal_force();
     CHECK(std::equal(force.data, force.data + force.size(), same.data));
     CHECK(some.problem().constraints().points_held_at_rest() == 3000);
-    const RestingCounts quiet = some.problem().terms().report().resting;
+    const RestingCounts quiet = some.problem().report().resting;
     CHECK_MESSAGE(2 * quiet.quiet > quiet.blocks, quiet.quiet, " of ", quiet.blocks, " blocks left out");
     CHECK(some.simulation->explanation(registry()).find("points held at rest: no wave ever reaches them") != std::string::npos);
   }
@@ -252,7 +252,7 @@ TEST_CASE("skipping: a bond of a symmetric kinematics is evaluated once for both
 
 TEST_CASE("skipping: a constant stiffness is assembled and factorised once") {
   Run linear(strip, {}), curved(strip, {"material.type=\"saint_venant_kirchhoff\""});
-  const std::size_t points = linear.problem().terms().report().evaluation_points;
+  const std::size_t points = linear.problem().report().evaluation_points;
   linear.end();
   curved.end();
   // `projection` gives W A of each evaluation point once; batches are padded.
@@ -280,7 +280,7 @@ TEST_CASE("skipping: without damage there is no state of bonds, and lattices sto
     run.simulation->problem().state().velocity();
     run.simulation->problem().masses().by_point();
     per_point = static_cast<double>(run.simulation->problem().bytes()) / static_cast<double>(body.points());
-    return run.simulation->problem().terms().report();
+    return run.simulation->problem().report();
   };
   double intact = 0, failing = 0;
   const ModelReport report = bytes("conventional", "", intact);

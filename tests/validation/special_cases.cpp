@@ -116,7 +116,7 @@ TEST_CASE("selective leaves evaluation points alone whose owner has no gradient 
       const auto plain = spur(cloud, fmt::format("type = \"{}\"", base)), mapped = spur(cloud, fmt::format("type = \"selective\"\nbase = \"{}\"", base));
       BodyProblem& problem = mapped->problem();
       const Body& body = problem.body();
-      REQUIRE(problem.terms().report().singular_families == 4);
+      REQUIRE(problem.report().singular_families == 4);
       PointSamples a, b;
       REQUIRE(plain->problem().terms().sample({plain->problem().state().displacement(), 0}, a).ok());
       REQUIRE(problem.terms().sample({problem.state().displacement(), 0}, b).ok());
@@ -159,7 +159,7 @@ TEST_CASE("a report counts the evaluation points of a force evaluation: points, 
     const auto count = [&](const std::string& kinematics) {
       const auto simulation = build(contract::scene_text({.dimension = 2, .cloud = cloud, .cells = 8}, kinematics));
       points = simulation->problem().body().points();
-      return simulation->problem().terms().report().evaluation_points;
+      return simulation->problem().report().evaluation_points;
     };
     const std::size_t bonds = 2 * count("type = \"bond_based\"");
     CHECK(count("type = \"conventional\"") == points);
@@ -173,7 +173,7 @@ TEST_CASE("a report counts the evaluation points of a force evaluation: points, 
 TEST_CASE("a consistent cloud says between which bounds its weights lie, positive ones about 1") {
   const auto simulation = build(contract::scene_text({.dimension = 2, .cloud = true, .consistent = true, .cells = 8}, "type = \"baqp\""));
   double low = 0, high = 0;
-  for (const auto& [label, text] : simulation->problem().terms().report().notes)
+  for (const auto& [label, text] : simulation->problem().report().notes)
     if (const std::size_t at = text.find("w/W "); at != std::string::npos) REQUIRE(std::sscanf(text.c_str() + at, "w/W %lf to %lf", &low, &high) == 2);
   CHECK(low > 0);
   CHECK(low < 1);
@@ -217,7 +217,7 @@ TEST_CASE("bonds that fail give what they owe to every point, the first one too:
     const auto [before, before_size] = momentum();
     contract::run(*simulation);
     const auto [after, size] = momentum();
-    CHECK(problem.terms().bond_checks().failed > 0);
+    CHECK(problem.fracture()->checks().failed > 0);
     CHECK(size > 0);
     CHECK(std::abs(after - before) <= 1e-12 * size);
   }
@@ -239,7 +239,7 @@ TEST_CASE("bonds that fail while their points are inside out: nothing is taken o
       if (x > 6) u.component(0)[p] = 12 - 2 * x, u.component(1)[p] = 40;
     }
     CHECK(problem.advance(0));
-    CHECK(problem.terms().bond_checks().failed > 0);
+    CHECK(problem.fracture()->checks().failed > 0);
     CHECK(problem.state().energies.dissipated == 0);
     CHECK(problem.fracture_summary().find("warning       1 times points were turned inside out where bonds failed") != std::string::npos);
   }

@@ -30,7 +30,7 @@ Sample sample(const std::string& scene, const std::string& set, std::vector<std:
   REQUIRE_MESSAGE(status.ok(), status.description);
   const std::vector<std::int32_t>& points = problem.body().set(set);
   REQUIRE(points.size() == 1);
-  const ModelReport report = problem.terms().report();
+  const ModelReport report = problem.report();
   const double H = samples.H.components() > 0 ? samples.H.component(0)[points[0]] : 0.0;   // pair laws have none
   return {samples.strain_energy_density.data()[points[0]], H, report.fallbacks, report.dropped_parts};
 }

@@ -15,10 +15,8 @@
 
 namespace perikit {
 
-class BondMonitor;
 class CloudFamilies;
 class LatticeFamilies;
-struct NearestFailure;
 
 /// What is asked of families beyond their lists.
 struct FamilyNeeds {
@@ -83,8 +81,6 @@ class Families {
   GroupMarks marks_of(std::span<const std::int32_t> points) const;
   /// The marked points and everything in their families.
   GroupMarks around(const GroupMarks& marks) const;
-  /// known: what a loop over forces leaves behind; null: nothing. skip: see BondMonitor.
-  virtual std::unique_ptr<BondMonitor> make_monitor(const BodyDamage& damage, bool skip, const NearestFailure* known) const = 0;
 
   std::size_t bonds() const noexcept { return bonds_; }         ///< directed, of the set-up
   std::size_t cut() const noexcept { return cut_; }             ///< directed, by pre-cracks

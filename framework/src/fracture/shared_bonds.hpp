@@ -2,6 +2,8 @@
 /// Bonds of a part of a body as all ranks name them: by the places of their ends in the whole body. Where one rank has the whole,
 /// they keep their names.
 
+#include <compare>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -10,6 +12,17 @@
 #include "perikit/body/body.hpp"
 
 namespace perikit {
+
+/// The same as all ranks name it: by the places of its ends in the whole body.
+struct NamedBond {
+  std::int64_t point = 0, far = 0;
+  friend auto operator<=>(const NamedBond&, const NamedBond&) = default;
+};
+struct NamedChange {
+  NamedBond bond;
+  double integrity = 0;
+  friend bool operator<(const NamedChange& a, const NamedChange& b) { return a.bond < b.bond; }
+};
 
 class SharedBonds {
  public:

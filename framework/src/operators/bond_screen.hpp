@@ -30,6 +30,19 @@ struct BondScreen {
   AlignedVector<double> u;         ///< the displacement that `near` belongs to
   bool known = false;              ///< near is of this u
 
+  /// Before and after an evaluation of forces of the whole body, which marks.
+  void begin() {
+    known = false;
+    std::ranges::fill(near, std::uint8_t{0});
+    bonds.resize(static_cast<std::size_t>(thread_count()));
+    for (auto& of_thread : bonds) of_thread.clear();
+  }
+  void end(ConstFieldView at) {
+    u.assign(at.data, at.data + at.size());
+    known = true;
+  }
+  /// Whether the last one that ended was at these displacements.
+  bool known_at(ConstFieldView at) const noexcept { return known && std::equal(at.data, at.data + at.size(), u.begin()); }
   /// From any thread.
   void mark(std::size_t p) noexcept {
     std::atomic_ref(near[p / padding]).fetch_or(static_cast<std::uint8_t>(1u << p % padding), std::memory_order_relaxed);

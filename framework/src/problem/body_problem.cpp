@@ -9,7 +9,6 @@
 #include "families/families.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
-#include "problem/bonds/crossed_faces.hpp"
 #include "problem/bonds/near_bonds.hpp"
 #include "problem/companion.hpp"
 #include "problem/loose/loose_points.hpp"
@@ -34,8 +33,8 @@ BodyProblem::BodyProblem(ProblemParts parts, ProblemValues values)
       values_(std::move(values)),
       driven_work_(*parts_.terms, values_.state),
       surroundings_(parts_.partition.get(), parts_.images.get(), values_.points.dimension()),
-      world_({{"body", parts_.terms.get()}}),
-      saved_state_(values_.points, values_.constraints, parts_.fracture, *parts_.terms, values_.state) {
+      world_({{"body", parts_.terms.get(), parts_.fracture.get()}}),
+      saved_state_(values_.points, values_.constraints, parts_.fracture.get(), *parts_.terms, values_.state) {
   driven_work_.begin({state().displacement(), state().time, 0, terms().driven_by_velocity() ? state().velocity() : FieldView{}});
 }
 
@@ -75,7 +74,7 @@ EvaluationStatus BodyProblem::evaluate_forces(const Configuration& at, FieldView
   const Sampling asked = std::exchange(along_, Sampling::nothing);
   if (at.motion() && (!at.motion()->inside() || asked != Sampling::nothing || surroundings_.any())) at.motion()->finish();
   // Where histories go on or bonds fail between forces and samples these are others.
-  if (asked != Sampling::nothing && !terms().material_points() && !ghosts() && !parts_.fracture.damage()) {
+  if (asked != Sampling::nothing && !terms().material_points() && !ghosts() && !parts_.fracture) {
     PointSamples samples{.asked = asked};
     status = terms().forces_and_samples(Configuration(seen(u, seen_), at.time(), at.time_step(), at.velocity()), force, energy, samples);
     if (status.ok()) kept_ = std::move(samples);
@@ -143,7 +142,7 @@ EvaluationStatus BodyProblem::assemble_tangent(const Configuration& at, BlockMat
   refuse_ranks(parts_);
   EvaluationStatus status;
   surroundings_.fold(K, tangent_of_terms_, [&](BlockMatrix& of_terms) { status = terms().assemble(at.moved_to(seen(at.u(), seen_)), of_terms); });
-  if (status.ok()) hold_loose_points(terms().changed_bonds(), K);
+  if (status.ok()) hold_loose_points(parts_.families->changed(), K);
   if (status.ok() && weak_springs_ && weak_springs_->hold()) weak_springs_->add_to(K);
   return status;
 }
@@ -166,7 +165,7 @@ void BodyProblem::assemble_companion(ConstFieldView u, BlockMatrix& K, double mo
 }
 
 bool BodyProblem::constant_stiffness() const noexcept {
-  return world_.constant_tangent() && !parts_.fracture.damage();
+  return world_.constant_tangent() && !parts_.fracture;
 }
 
 void BodyProblem::accept() {
@@ -177,113 +176,14 @@ void BodyProblem::accept() {
 
 void BodyProblem::revert() { world_.revert(); }
 
-bool BodyProblem::update_bonds(const Configuration& at, double elapsed, FieldView velocity) {
-  const ConstFieldView u = at.u();
-  const Configuration reached(u, at.time(), 0, velocity);
-  driven_work_.end(reached);
-  if (!parts_.fracture.damage()) return false;
-  const Seen whole = seen(u, seen_);
-  std::vector<std::int32_t> moved;
-  StepInside step;
-  if (velocity.data) {
-    step.begin = [&](FieldView before) {
-      combine(1, u, -elapsed, velocity, before);
-      surroundings_.share(before);
-      if (images()) images()->extend(before);
-    };
-    step.act = [&](FieldView force, double time, double moment) {
-      const double growth = push(force, time, (1 - moment) * elapsed, velocity, moved);
-      // `whole` follows.
-      if (images()) seen(u, seen_);
-      else surroundings_.share(Seen::writable(u));
-      return growth;
-    };
-  }
-  const BondUpdate update = parts_.fracture.update(terms(), at.moved_to(whole), elapsed, state(), step);
-  if (update.changed == 0) return false;
-  if (velocity.data) {
-    renew_forces(reached, moved, update.ends);
-    driven_work_.begin(reached);
-  }
-  find_pieces(true);
-  return true;
-}
-
 void BodyProblem::find_pieces(bool fresh) {
   if (weak_springs_) weak_springs_->find(seen(state().displacement(), seen_), fresh);
-}
-
-/// What holds a component takes the impulse upon it; its work is that of all other forces, with the opposite sign.
-double BodyProblem::push(FieldView force, double time, double since, FieldView velocity, std::vector<std::int32_t>& moved) {
-  EvaluationStatus status;
-  finish(force, status);
-  const FieldView u = state().displacement(), internal = state().internal_force();
-  const ConstFieldView external = loads().any() ? state().external_force() : FieldView{};
-  const std::span<const double> by_point = masses().by_point();
-  const ConstFieldView free = constraints().free();
-  ExactSum growth, held;
-  for (int c = 0; c < velocity.components; ++c)
-    for (std::size_t p = 0; p < velocity.stride; ++p) {
-      const double f = force.component(c)[p];
-      if (f == 0) continue;   // far from bonds that failed
-      double& v = velocity.component(c)[p];
-      internal.component(c)[p] -= f;
-      if (!(by_point[p] > 0) || free.component(c)[p] == 0) {
-        held.add(f * v);
-        continue;
-      }
-      const double left = internal.component(c)[p] + (external.data ? external.component(c)[p] : 0.0);
-      growth.add(f * left / by_point[p]);
-      const double change = time * f / by_point[p];
-      v += change;
-      u.component(c)[p] += since * change;
-      moved.push_back(static_cast<std::int32_t>(p));
-    }
-  state().energies.external_work -= time * total_over_ranks(held);
-  return total_over_ranks(growth);
-}
-
-void BodyProblem::renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost) {
-  double* const energy = energy_wanted_ ? &state().energies.strain : nullptr;
-  EvaluationStatus status;
-  if (surroundings_.any() || weak_springs_) {
-    status = evaluate_forces(at, state().internal_force(), energy);
-  } else {
-    status = terms().renew_forces(at, moved, lost, state().internal_force(), energy);
-    describe(status);
-  }
-  if (!status.ok()) throw RunError("after bonds have failed: " + status.description);
 }
 
 std::string BodyProblem::watch_pieces(double weak_springs) {
   weak_springs_ = std::make_unique<WeakSprings>(*parts_.families, *this, terms(), weak_springs);
   find_pieces(true);
   return weak_springs_->names();
-}
-
-std::int64_t BodyProblem::failed_bonds() const { return static_cast<std::int64_t>(terms().bond_checks().failed); }
-
-std::string BodyProblem::crossed_faces() {
-  if (!parts_.fracture.damage() && body().cracks().empty()) return {};
-  CrossedFaces found = find_crossed_faces(*parts_.families, seen(state().displacement(), seen_));
-  communicator().sum({&found.points, 1});
-  if (found.points == 0) return {};
-  return fmt::format("faces of cracks pass through each other at {} points, by up to {:.2g} of the distance of both sides: bonds that have failed or are "
-                     "cut resist no pressure, and there is no contact",
-                     found.points, communicator().largest(found.deepest));
-}
-
-std::vector<std::byte> BodyProblem::bonds() const {
-  ByteWriter out;
-  if (parts_.fracture.damage()) parts_.fracture.write_here(terms(), out);
-  return out.take();
-}
-
-void BodyProblem::restore_bonds(std::span<const std::byte> bonds) {
-  ByteReader in(bonds);
-  parts_.fracture.read_here(terms(), in);
-  driven_work_.begin(configuration());
-  find_pieces(false);
 }
 
 void BodyProblem::restore(std::span<const std::byte> bytes) {
@@ -296,8 +196,14 @@ void BodyProblem::restore(ByteReader& in) {
   find_pieces(false);
 }
 
+ModelReport BodyProblem::report() const {
+  ModelReport report = terms().report();
+  if (parts_.fracture) parts_.fracture->report(report);
+  return report;
+}
+
 std::size_t BodyProblem::bytes() const noexcept {
-  return body().bytes() + terms().report().bytes + values_.state.bytes() + masses().bytes() + (near_bonds_ ? near_bonds_->bytes() : 0);
+  return body().bytes() + report().bytes + values_.state.bytes() + masses().bytes() + (near_bonds_ ? near_bonds_->bytes() : 0);
 }
 
 }  // namespace perikit

@@ -8,14 +8,13 @@
 #include <vector>
 
 #include "body/partition/partition.hpp"
+#include "fracture/fracture.hpp"
 #include "operators/samples.hpp"
 #include "perikit/problem/problem.hpp"
-#include "problem/bonds/fracture_record.hpp"
 #include "problem/driven_work.hpp"
 #include "problem/saved/saved_state.hpp"
 #include "problem/surroundings/surroundings.hpp"
 #include "problem/world.hpp"
-#include "terms/term.hpp"
 
 namespace perikit {
 
@@ -34,8 +33,8 @@ struct ProblemParts {
   std::unique_ptr<const ImageMap> images;       ///< null without
   std::unique_ptr<Laws> laws;
   std::unique_ptr<Families> families;           ///< of the body: everything that looks at bonds borrows them
-  FractureRecord fracture;
   std::unique_ptr<Terms> terms;
+  std::unique_ptr<Fracture> fracture;           ///< null: bonds never fail
   std::string kinematics;                       ///< names, for messages
   std::vector<std::string> materials;           ///< by material of the body
   std::vector<std::string> warnings;            ///< of what is allowed and can hardly be meant
@@ -97,10 +96,12 @@ class BodyProblem final : public Problem {
   /// Null where one rank has the whole body.
   const Partition* partition() const noexcept { return parts_.partition.get(); }
   const Ghosts* ghosts() const noexcept { return surroundings_.ghosts(); }
-  std::string fracture_summary() const {
-    const Energies& e = values_.state.energies;
-    return parts_.fracture.summary(terms().bond_checks(), e.dissipated - e.dissipated_by_laws);
-  }
+  /// Null where bonds never fail.
+  Fracture* fracture() noexcept { return parts_.fracture.get(); }
+  /// How bonds failed so far, in words; empty where they never fail. All ranks must call it.
+  std::string fracture_summary() const;
+  /// Of the terms and of bonds that fail.
+  ModelReport report() const;
   const std::vector<std::string>& warnings() const noexcept { return parts_.warnings; }
   /// Faces of cracks that have passed through each other, in words; empty: none. All ranks must call it.
   std::string crossed_faces();
@@ -126,12 +127,18 @@ class BodyProblem final : public Problem {
   void describe(EvaluationStatus& status) const;
   /// Looks anew for pieces that nothing holds, where they are watched. fresh: see WeakSprings.
   void find_pieces(bool fresh);
-  /// See StepInside::act. since: of the end of the step [s].
+  /// `moved` are the points that impulses have moved, some of them twice.
+  BondUpdate fail_inside(const Configuration& end, double elapsed, FieldView velocity, std::vector<std::int32_t>& moved);
+  /// Bonds took it with them [J].
+  void dissipate(double energy);
+  /// The forces [N] act so much longer [s], as many seconds before the end of the step as `since` says: velocities change, and displacements by what that has done
+  /// since. Overwrites them; returns how fast their power would have grown without the bonds [W/s].
   double push(FieldView force, double time, double since, FieldView velocity, std::vector<std::int32_t>& moved);
   /// Forces and strain energy become those of the bonds that are left, where the points are.
   void renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost);
 
   Field seen_, seen_direction_;   ///< what terms see, with images
+  Field before_;                 ///< displacement at the beginning of a step inside of which bonds fail
   bool energy_wanted_ = false;   ///< by the last evaluation of forces
   Sampling along_ = Sampling::nothing;   ///< with the next one
   std::optional<PointSamples> kept_;     ///< with the last one

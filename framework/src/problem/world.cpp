@@ -32,7 +32,7 @@ World::World(std::vector<Member> bodies, std::vector<std::unique_ptr<Term>> betw
   for (const auto& term : between_)
     if (term->stateful() || term->driven() || term->breakable()) throw std::invalid_argument("a term between bodies that remembers, is driven or knows bonds");
   // What looks for bonds takes fields as one piece of memory.
-  if (members_.size() > 1 && std::ranges::any_of(members_, [](const Member& member) { return member.terms->bonds_may_fail(); }))
+  if (members_.size() > 1 && std::ranges::any_of(members_, [](const Member& member) { return member.fracture != nullptr; }))
     throw std::invalid_argument("several bodies of which bonds may fail");
 }
 

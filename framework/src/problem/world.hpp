@@ -12,12 +12,15 @@
 
 namespace perikit {
 
+class Fracture;
+
 class World {
  public:
   /// A body: its terms know which.
   struct Member {
     std::string name;   ///< for messages
     Terms* terms;
+    const Fracture* fracture = nullptr;   ///< null: its bonds never fail
   };
   /// The terms of the bodies must outlive the world. A term between bodies gets the whole fields and couples points of any bodies. Throws
   /// std::invalid_argument where one remembers, is driven or knows bonds, and where bonds of one of several bodies may fail.

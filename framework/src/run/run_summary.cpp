@@ -39,7 +39,7 @@ std::string RunRecorder::closing(const TimesBefore& before) const {
   const auto now = std::chrono::steady_clock::now();
   const double spent = std::chrono::duration<double>(now - start_).count(), all = std::chrono::duration<double>(now - before.begin).count(), steps_time = std::max(0.0, spent - output_seconds_);
   const auto steps = static_cast<double>(problem.state().step - first_step_), points = static_cast<double>(problem.points().size_on_all_ranks());
-  std::string text = problem.fracture_summary() + quiet_summary(problem.terms().report().resting, simulation_.dynamic());
+  std::string text = problem.fracture_summary() + quiet_summary(problem.report().resting, simulation_.dynamic());
   text += fmt::format("time          {:.2f} s in all: {:.2f} s set-up, {:.2f} s plan, {:.2f} s steps, {:.2f} s output ({} frames, {} rows of history, {} checkpoints)\n", all,
                       before.set_up, before.plan, steps_time, output_seconds_, frames_written_, rows_written_, checkpoints_written_);
   if (before.set_up + before.plan >= 1) text += fmt::format("set-up        {}\n", simulation_.set_up().summary());

@@ -156,7 +156,7 @@ std::string ranks_summary(const BodyProblem& problem) {
 
 std::string Simulation::summary() {
   const Body& body = problem_->body();
-  const ModelReport report = problem_->terms().report();
+  const ModelReport report = problem_->report();
   std::string text = fmt::format("points        {} ({}, {}D, spacing {:.6g} m, horizon {:.6g} m)\n", body.points_of_all_ranks(),
                                  body.lattice() ? "lattice" : "cloud", body.dimension(), body.spacing(), body.horizon());
   if (problem_->images())
@@ -204,7 +204,7 @@ std::string Simulation::plan() {
 }
 
 std::string Simulation::explanation(const Registry& registry) const {
-  std::vector<SkipNote> notes = problem_->terms().report().skips;
+  std::vector<SkipNote> notes = problem_->report().skips;
   std::size_t known = 0;
   for (const Kind kind : all_kinds) known += registry.names(kind).size();
   notes.push_back({"libraries that the scene does not name", "parts are found by manifest", fmt::format("{} libraries opened for {} known parts", registry.opened().size(), known)});

@@ -231,8 +231,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;
   if (scene.damage) steps.begin("limits of bonds");
-  parts.fracture = FractureRecord(build_damage(scene, factory, of_terms, parts.images.get(), beyond.images, partition, quasi_static, warnings));
-  of_terms.damage = parts.fracture.damage();
+  std::unique_ptr<const BodyDamage> damage = build_damage(scene, factory, of_terms, parts.images.get(), beyond.images, partition, quasi_static, warnings);
   steps.begin("weights");
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
@@ -241,6 +240,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   steps.begin("evaluation points");
   if (of_terms.consistency) of_terms.consistency->show_share = [&steps](double share) { steps.share_done(share); };
   parts.terms = std::make_unique<Terms>(of_terms);
+  if (damage) parts.fracture = std::make_unique<Fracture>(*parts.terms, std::move(damage));
   if (of_terms.consistency) of_terms.consistency->show_share = {};
   parts.kinematics = scene.kinematics->type;
   for (const auto& part : materials(scene)) parts.materials.push_back(part->type);

@@ -87,7 +87,7 @@ RunOutcome run_here(const Scene& scene, const PartFactory& parts, const fs::path
     outcome.measures["set_up_time"] = seconds(clock::now() - start);
     BodyProblem& problem = simulation.problem();
     outcome.measures["points"] = static_cast<double>(problem.points().size_on_all_ranks());
-    outcome.measures["bonds"] = static_cast<double>(problem.terms().report().bonds);
+    outcome.measures["bonds"] = static_cast<double>(problem.report().bonds);
     outcome.measures["memory"] = static_cast<double>(problem.bytes());
     const std::string summary = simulation.summary();
     simulation.refuse_memory();

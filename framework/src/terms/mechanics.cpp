@@ -108,7 +108,7 @@ void Mechanics::find_laminates(GroupMarks marks, bool again) {
 }
 
 std::int64_t Mechanics::add_forces(const Configuration& at, const Region& region, const ForceSum& sum, const SampleSums* samples) {
-  BatchWork work = this->work(at, {.work = Work::force, .energy = sum.wants_stored(), .screen = region.whole() ? screen_ : nullptr});
+  BatchWork work = this->work(at, {.work = Work::force, .energy = sum.wants_stored(), .screen = sum.screen});
   if (samples) work.sample_along(*samples);
   Pass pass{work, at.unfinished(), {}, sum.force, nullptr, sum.energies.empty() ? nullptr : sum.energies.data(), -1, {}, region.only(), region.near()};
   pass.arrival = at.arrival();

@@ -30,7 +30,6 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   void bonds_changed(std::span<const std::int32_t> points) override;
   void complete(GroupMarks& marks) const override { space_->complete(marks); }
   void add_bonds(const Configuration& at, const Region& region, BondSamples& samples) override;
-  void screen(BondScreen* screen) override { screen_ = screen; }
   PointFlux point_flux() const noexcept override { return space_->point_flux(); }
   MaterialPoints& points() noexcept override { return *points_; }
   void history_restored() override { space_->history_restored(); }
@@ -53,7 +52,6 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   std::unique_ptr<EvaluationSpace> space_;
   std::unique_ptr<MaterialPoints> points_;
   std::unique_ptr<Laminates> laminates_;
-  BondScreen* screen_ = nullptr;
   std::shared_ptr<const CloudConsistency> consistency_;
 };
 

@@ -10,6 +10,7 @@
 #include "assembly/volumetric_rows.hpp"
 #include "families/families.hpp"
 #include "operators/bond_samples.hpp"
+#include "operators/bond_screen.hpp"
 #include "operators/group_energy.hpp"
 #include "operators/material_points.hpp"
 #include "operators/point_flux.hpp"
@@ -18,6 +19,8 @@
 #include "perikit/model/configuration.hpp"
 
 namespace perikit {
+
+struct NearestFailure;
 
 /// The evaluation points that an evaluation takes; by default all. They are those of the points `evaluated`, and the same few others whichever bonds have failed.
 /// `gradients`: those points and everything in their families. Forces are complete, and bit for bit those of the whole body, at points all of whose
@@ -32,11 +35,20 @@ struct Region {
   const std::uint8_t* near() const noexcept { return gradients ? gradients->data() : nullptr; }
 };
 
+/// A region of these points, with the marks that it refers to.
+struct MarkedRegion {
+  MarkedRegion() = default;
+  MarkedRegion(const Families& families, GroupMarks of) : evaluated(std::move(of)), gradients(families.around(evaluated)) {}
+  operator Region() const noexcept { return {&evaluated, &gradients}; }
+  GroupMarks evaluated, gradients;
+};
+
 /// What an evaluation of forces adds to.
 struct ForceSum {
   FieldView force;                       ///< += -dE/du [N]
   std::span<GroupEnergy> energies = {};  ///< += by group of eight points [J]; empty: not wanted
   bool stored = true;                    ///< stored energies are wanted, not only dissipated ones
+  BondScreen* screen = nullptr;          ///< of the whole body alone: the bonds that may hold too much energy are marked in it; null: in none
   bool wants_stored() const noexcept { return stored && !energies.empty(); }
 };
 
@@ -105,10 +117,8 @@ class BreakableTerm {
   virtual void complete(GroupMarks& marks) const { mark_whole_runs(1, marks); }
   /// What the evaluation points of the region hold.
   virtual void add_bonds(const Configuration& at, const Region& region, BondSamples& samples) = 0;
-  /// Bonds may fail from now on. What its loop over forces leaves behind for those who look for them; null: nothing.
-  virtual const NearestFailure* watch(const BodyDamage&) { return nullptr; }
-  /// Evaluations of forces of the whole body mark the groups of bonds that may hold too much energy, from now on; null: no longer.
-  virtual void screen(BondScreen* screen) = 0;
+  /// Bonds may fail by their stretch from now on, none below this one. What its loop over forces leaves behind for those who look for them; null: nothing.
+  virtual const NearestFailure* watch(double /*least_onset*/) { return nullptr; }
   /// Of the last evaluation, where that was one of forces, and leaves any.
   virtual PointFlux point_flux() const noexcept { return {}; }
 };

@@ -4,20 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
-#include <optional>
-#include <stdexcept>
 
 #include "assembly/block_pattern.hpp"
 #include "body/interfaces.hpp"
 #include "cloud_balance/consistency.hpp"
 #include "core/symmetric_matrix.hpp"
 #include "families/lattice/lattice_families.hpp"
-#include "fracture/failure_energy.hpp"
-#include "fracture/fracture.hpp"
-#include "fracture/search/bond_criterion.hpp"
-#include "fracture/search/bond_monitor.hpp"
-#include "fracture/shared_bonds.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
 #include "perikit/core/warnings.hpp"
@@ -26,58 +20,6 @@
 #include "terms/penalty/zero_energy_penalty.hpp"
 
 namespace perikit {
-
-namespace {
-
-ReleaseParts release_parts(const TermParts& parts) {
-  const bool shifted = parts.consistency && parts.consistency->shift.components() > 0;
-  return {*parts.families,
-          parts.formulation,
-          *parts.laws,
-          parts.stabilization.get(),
-          shifted ? ConstFieldView(parts.consistency->shift) : ConstFieldView{},
-          parts.consistency ? std::span<const double>(parts.consistency->factors) : std::span<const double>(),
-          parts.damage && parts.damage->copies};
-}
-
-/// What the criterion looks at with these kinematics.
-DamageTraits asked_of(const TermParts& parts) {
-  DamageTraits traits = parts.damage->law->traits();
-  const bool known = BondRelease::unknown(parts.formulation, parts.families->body().dimension(), parts.stabilization != nullptr) == nullptr;
-  traits.released = traits.released && traits.energy && !traits.stress && known;
-  return traits;
-}
-
-/// Criteria by energy where a bond takes more than it holds (framework/docs/fracture.md, "What a crack costs").
-void warn_of_cost(const TermParts& parts, ModelReport& report) {
-  const Formulation& f = parts.formulation;
-  const DamageTraits asked = asked_of(parts);
-  if (!asked.energy || asked.released || f.pairs) return;
-  const char* const unknown = BondRelease::unknown(f, parts.families->body().dimension(), parts.stabilization != nullptr);
-  report.warnings.push_back(named("crack_cost", fmt::format("a criterion by the energy that bonds hold, with gradients: a bond takes more than it holds, and cracks cost 1.4 to 5 "
-                                        "times Gc and more; {}; what they cost is measured in fracture.md, \"What a crack costs\"",
-                                        unknown ? fmt::format("what bonds set free is not known {}", unknown)
-                                                : "by the energy that bonds set free (energy = \"released\") they cost Gc")));
-}
-
-/// Where bonds that fail would create energy: framework/docs/fracture.md, "Bonds that stay".
-void warn_of_energy(const TermParts& parts, ModelReport& report) {
-  const bool stabilized = parts.stabilization != nullptr;
-  const char* const what = creates_energy(parts.formulation, stabilized, parts.families->body().dimension());
-  if (!what) return;
-  if (!parts.damage->second_law)
-    report.warnings.push_back(named("second_law", fmt::format(
-        "{}: updates of bonds that fail create energy, unless damage.second_law is true; how much is measured in fracture.md, "
-        "\"Every kinematics and kernel\"",
-        what)));
-  else if (parts.formulation.point && !stabilized)
-    report.warnings.push_back(named("second_law", fmt::format(
-        "{}: most bonds beyond their limit stay, as their failure would raise the energy of zero-energy modes; cracks need a "
-        "stabilization (fracture.md, \"Bonds that stay\")",
-        what)));
-}
-
-}  // namespace
 
 namespace {
 
@@ -130,26 +72,6 @@ struct Terms::Assemblies {
   int steps = 1;
 };
 
-struct Terms::Failing {
-  Fracture fracture;
-  Field force;  ///< work field, 0 between its uses
-  std::vector<std::int32_t> ends = {};  ///< of bonds that changed in the last update
-
-  Fracture::Body body(Terms& terms);
-  FieldView work(ConstFieldView like, const Body& body) {
-    if (force.size() == 0) force = body.make_field(like.components);
-    return force;
-  }
-  /// to += factor times what a loop over evaluation points has left in the groups near them, where there are `to`; what it has left elsewhere is
-  /// the same before and after bonds have failed.
-  void take(const GroupMarks& near, double factor, FieldView to) {
-    for (std::size_t g = 0; g < near.size() && to.data; ++g)
-      for (int c = 0; c < force.components() && near[g]; ++c)
-        for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) to.component(c)[p] += factor * force.component(c)[p];
-    fill(0, force);
-  }
-};
-
 Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   const Formulation& formulation = parts_.formulation;
   const Families& families = *parts_.families;
@@ -165,29 +87,6 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   if (parts_.stabilization) terms_.push_back(make_penalty({families, formulation, *parts_.laws, parts_.stabilization, parts_.skip}));
   for (const TermMaker& make : parts_.further) terms_.push_back(make(parts_));
   energies_.resize(terms_.size());
-  if (!parts_.damage) return;
-  const NearestFailure* known = nullptr;
-  for (const auto& term : terms_) {
-    BreakableTerm* const bonds = term->breakable();
-    const NearestFailure* const of_term = bonds ? bonds->watch(*parts_.damage) : nullptr;
-    if (of_term) known = of_term;
-  }
-  Families& all = *parts_.families;
-  all.let_fail();
-  std::unique_ptr<BondFinder> finder;
-  if (parts_.damage->by_stretch())
-    finder = all.make_monitor(*parts_.damage, parts_.skip, known);
-  else {
-    auto criterion = std::make_unique<BondCriterion>(release_parts(parts_), asked_of(parts_), parts_.damage, terms_, parts_.skip);
-    if (BondScreen* const screen = criterion->screen()) {
-      for (const auto& term : terms_)
-        if (BreakableTerm* const bonds = term->breakable()) bonds->screen(screen);
-      criterion_ = criterion.get();
-      criterion_->forces_mark();
-    }
-    finder = std::move(criterion);
-  }
-  failing_ = std::make_unique<Failing>(Failing{Fracture(all, *parts_.damage, std::move(finder)), {}});
 }
 
 Terms::~Terms() = default;
@@ -245,7 +144,7 @@ void clear(const Body& body, FieldView field) {
 /// add(term, sum) adds the forces of a term to `force`, which is zero.
 template <class Add>
 EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView force, double* energy) {
-  if (criterion_) criterion_->begin_forces();
+  if (screen_) screen_->begin();
   ExactSum stored;
   std::int64_t bad = -1;
   const Term* met = nullptr;
@@ -254,13 +153,13 @@ EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView 
     const StatefulTerm* const remembers = terms_[t]->stateful();
     const bool dissipates = remembers && remembers->dissipates() && at.ends_step();
     if (energy || dissipates) energies_[t].assign(groups(), {});
-    bad = add(*terms_[t], ForceSum{force, energy || dissipates ? std::span(energies_[t]) : std::span<GroupEnergy>(), energy != nullptr});
+    bad = add(*terms_[t], ForceSum{force, energy || dissipates ? std::span(energies_[t]) : std::span<GroupEnergy>(), energy != nullptr, screen_});
     if (energy) add_owned(energies_[t], &GroupEnergy::stored, stored);
     if (!dissipates) continue;
     dissipated_ = {};
     add_owned(energies_[t], &GroupEnergy::dissipated, dissipated_);
   }
-  if (criterion_ && bad < 0) criterion_->end_forces(at.u());
+  if (screen_ && bad < 0) screen_->end(at.u());
   if (energy) *energy = total_over_ranks(stored);
   return status(bad, met);
 }
@@ -291,11 +190,36 @@ EvaluationStatus Terms::forces_and_samples(const Configuration& at, FieldView fo
       at, force, energy);
 }
 
+/// 0 between its uses.
+FieldView Terms::work_field(int components) {
+  if (work_.size() == 0) work_ = body().make_field(components);
+  return work_;
+}
+
+double Terms::add_forces(const Configuration& at, const Region& region, double factor, FieldView sum) {
+  const FieldView own = work_field(at.u().components);
+  ExactSum stored;
+  std::vector<GroupEnergy> energies;
+  std::int64_t bad = -1;
+  for (const auto& term : terms_) {
+    energies.assign(groups(), {});
+    bad = std::max(bad, term->forces(at.moved_to(at.u()), region, {own, energies}));
+    add_owned(energies, &GroupEnergy::stored, stored);
+  }
+  const bool ok = communicator().largest(bad >= 0 ? 1 : 0) == 0;
+  const double energy = ok ? total_over_ranks(stored) : std::numeric_limits<double>::quiet_NaN();
+  const GroupMarks& near = *region.gradients;
+  for (std::size_t g = 0; g < near.size() && sum.data && std::isfinite(energy); ++g)
+    for (int c = 0; c < own.components && near[g]; ++c)
+      for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) sum.component(c)[p] += factor * own.component(c)[p];
+  fill(0, own);
+  return energy;
+}
+
 EvaluationStatus Terms::renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
                                      FieldView force, double* energy) {
-  if (!failing_ || !parts_.skip || stateful()) return forces(at, force, energy);
+  if (!parts_.skip || stateful()) return forces(at, force, energy);
   const Families& families = *parts_.families;
-  const Body& body = families.body();
   const int steps = coupling_reach(), reach = std::max(1, steps - 1);   // the latter of the evaluation points at a point
   const auto around = [&](GroupMarks marks, int times) {
     for (int k = 0; k < times; ++k) marks = families.around(marks);
@@ -310,15 +234,15 @@ EvaluationStatus Terms::renew_forces(const Configuration& at, std::span<const st
       if (const BreakableTerm* const bonds = term->breakable()) bonds->complete(complete);
     add(only, complete);
   }
-  if (2 * count(only) > body.internal().size()) return forces(at, force, energy);
-  const GroupMarks near = families.around(only);
-  const FieldView own = failing_->work(force, body);
+  if (2 * count(only) > body().internal().size()) return forces(at, force, energy);
+  const MarkedRegion region(families, std::move(only));
+  const FieldView own = work_field(force.components);
   ExactSum sum;
   std::vector<GroupEnergy> anew;
   std::int64_t bad = -1;
   for (std::size_t t = 0; t < terms_.size() && bad < 0; ++t) {
     if (energy) anew.assign(groups(), {});
-    bad = terms_[t]->forces(at.moved_to(at.u()), {&only, &near}, {own, anew});
+    bad = terms_[t]->forces(at.moved_to(at.u()), region, {own, anew});
     if (!energy) continue;
     // The energies of the groups that are complete take the place of those that they had: the sum is bit for bit that of all forces.
     for (std::size_t g = 0; g < anew.size(); ++g)
@@ -330,48 +254,13 @@ EvaluationStatus Terms::renew_forces(const Configuration& at, std::span<const st
     for (int c = 0; c < force.components && renewed[g]; ++c)
       for (std::size_t p = g * padding; p < (g + 1) * padding; ++p)
         if (marked(renewed, p)) force.component(c)[p] = own.component(c)[p];
-  failing_->take(near, 0, {});
+  fill(0, own);
   return status(bad);
 }
 
-EvaluationStatus Terms::tangent(const Configuration& at, ConstFieldView w, FieldView Kw, const GroupRings* rings) {
+EvaluationStatus Terms::tangent(const Configuration& at, ConstFieldView w, FieldView Kw, const Region& region) {
   clear(body(), Kw);
-  const Region region = rings ? Region{&rings->only, &rings->near} : Region{};
   return each_term([&](Term& term) { return term.tangent(at, w, region, Kw); });
-}
-
-namespace {
-
-/// A family that is left with this share of its influence, and with a shape tensor of this condition, has gradients that are about as stiff as
-/// before: half of a family, as it is left beside a crack, is as stiff as a whole one.
-constexpr double enough_left = 0.4, round_enough = 4.0;
-
-/// Whether the gradients of the point may have become stiffer than those of whole families.
-bool may_be_stiff(const TermParts& parts, std::size_t p) {
-  const Formulation& f = parts.formulation;
-  if (f.weighted || f.order > 1) return true;   // parts of the family and moments of higher order degenerate before the shape tensor does
-  return !(parts.families->remaining_influence(p) > enough_left && parts.families->condition(p) < round_enough);
-}
-
-}  // namespace
-
-GroupRings Terms::near_failed_bonds() const {
-  if (!failing_) return {};
-  const Families& families = *parts_.families;
-  std::vector<std::int32_t> stiff;
-  // Ranks know whole families of their own points alone.
-  for (const std::int32_t p : failing_->ends)
-    if (families.body().owns(static_cast<std::size_t>(p)) && may_be_stiff(parts_, static_cast<std::size_t>(p))) stiff.push_back(p);
-  GroupRings rings;
-  rings.inside = SharedBonds(families.body()).points_beside(stiff);
-  if (rings.inside.empty()) return {};
-  std::vector<std::int32_t> points;
-  for (std::size_t p = 0; p < rings.inside.size(); ++p)
-    if (rings.inside[p]) points.push_back(static_cast<std::int32_t>(p));
-  rings.only = families.marks_of(points);
-  for (int k = 1; k < std::max(2, coupling_reach()); ++k) rings.only = families.around(rings.only);
-  rings.near = families.around(rings.only);
-  return rings;
 }
 
 EvaluationStatus Terms::sample(const Configuration& at, PointSamples& samples) {
@@ -492,102 +381,13 @@ void Terms::revert() {
   if (stateful()) stateful()->points().revert();
 }
 
-void Terms::bonds_changed(std::span<const std::int32_t> points) {
-  for (const auto& term : terms_)
-    if (BreakableTerm* const bonds = term->breakable()) bonds->bonds_changed(points);
-}
-
-BondUpdate Terms::update_bonds(const Configuration& at, double elapsed, const StepInside& step) {
-  if (!failing_) return {};
-  BondUpdate update = failing_->fracture.update(at, elapsed, step, failing_->body(*this));
-  failing_->ends = update.ends;
-  return update;
-}
-
-bool Terms::settling() const noexcept { return failing_ && failing_->fracture.settling(); }
-
-void Terms::let_others_forecast(bool to_others) { failing_->fracture.let_others_forecast(to_others); }
-
-EvaluationStatus Terms::weakening_forces(const Configuration& at, ConstFieldView w, FieldView force) {
-  if (failing_->fracture.add_weakening(at, w, force, failing_->body(*this))) return {};
-  return {.description = "near bonds that weaken"};
-}
-
-BondUpdate Terms::weaken_bonds(const Configuration& at, ConstFieldView forecast) { return failing_->fracture.weaken(at, forecast, failing_->body(*this)); }
-
-/// What those who change bonds need of the terms. As long as it lives, before and after bonds fail, the same groups are asked for.
-Fracture::Body Terms::Failing::body(Terms& terms) {
-  const Families& families = *terms.parts_.families;
-  // Forces of the region to the work field, their energy over all ranks; not a number where a point is inadmissible. No step ends: nothing is kept.
-  const auto evaluate = [this, &terms, &families](const Configuration& at, const GroupMarks& marks, const GroupMarks& near) {
-    const FieldView own = work(at.u(), families.body());
-    ExactSum energy;
-    std::vector<GroupEnergy> energies;
-    std::int64_t bad = -1;
-    for (const auto& term : terms.terms_) {
-      energies.assign(terms.groups(), {});
-      bad = std::max(bad, term->forces(at.moved_to(at.u()), {&marks, &near}, {own, energies}));
-      terms.add_owned(energies, &GroupEnergy::stored, energy);
-    }
-    const bool ok = communicator().largest(bad >= 0 ? 1 : 0) == 0;
-    return ok ? total_over_ranks(energy) : std::numeric_limits<double>::quiet_NaN();
-  };
-  const auto forces = [this, evaluate, &families, last = GroupMarks(), near = GroupMarks()](
-                          const Configuration& at, const GroupMarks& marks, double factor, FieldView sum) mutable {
-    if (marks != last) {
-      last = marks;
-      near = families.around(marks);
-    }
-    const double energy = evaluate(at, marks, near);
-    take(near, factor, std::isfinite(energy) ? sum : FieldView{});
-    return energy;
-  };
-  const auto energy = [this, evaluate, &families](const Configuration& at, const GroupMarks& marks) {
-    const GroupMarks near = families.around(marks);
-    const double energy = evaluate(at, marks, near);
-    take(near, 0, {});
-    return energy;
-  };
-  const Formulation& f = terms.parts_.formulation;
-  const bool owners_alone = !f.dilatation && !(f.bond && f.far_share > 0);
-  return {forces, energy, owners_alone, [&terms](std::span<const std::int32_t> points) { terms.bonds_changed(points); }};
-}
-
-std::vector<BondEnergy> Terms::bond_energies(const Configuration& at) {
-  return BondCriterion(release_parts(parts_), {.energy = true}, nullptr, terms_, parts_.skip).energies(at);
-}
-
-std::vector<BondEnergy> Terms::released_energies(const Configuration& at) {
-  if (const char* const reason = BondRelease::unknown(parts_.formulation, parts_.families->body().dimension(), parts_.stabilization != nullptr))
-    throw std::logic_error(fmt::format("what bonds set free is not known {}", reason));
-  return BondCriterion(release_parts(parts_), {.energy = true, .released = true}, nullptr, terms_, parts_.skip).energies(at);
-}
-
-std::vector<BondChange> Terms::changed_bonds() const {
-  return parts_.families->changed();
-}
-
-std::vector<NamedChange> Terms::own_changed_bonds() const {
-  return SharedBonds(parts_.families->body()).outward(changed_bonds());
-}
-
-std::vector<BondChange> Terms::bonds_here(std::span<const NamedChange> changes) const {
-  return SharedBonds(parts_.families->body()).inward(changes);
-}
-
-void Terms::restore_bonds(std::span<const BondChange> changes) {
-  if (failing_) failing_->fracture.restore(changes, [&](std::span<const std::int32_t> points) { bonds_changed(points); });
-}
-
-BondChecks Terms::bond_checks() const { return failing_ ? failing_->fracture.checks() : BondChecks{}; }
-
 ModelReport Terms::report() const {
   const Families& families = *parts_.families;
   ModelReport report;
   report.bonds = families.bonds();
   report.broken_bonds = families.cut();
   report.singular_families = families.singular();
-  report.bytes = families.bytes() + (failing_ ? failing_->fracture.bytes() : 0);
+  report.bytes = families.bytes();
   const int d = families.body().dimension();
   const double bond_bytes = static_cast<double>(report.bonds) * 8 * (d + 1);
   if (const LatticeFamilies* lattice = families.lattice()) {
@@ -608,10 +408,6 @@ ModelReport Terms::report() const {
   if (!conservative())
     report.warnings.push_back(
         named("forces", "local force state: forces are not the derivative of the energy, moments do not balance; for comparison only"));
-  if (parts_.damage) {
-    warn_of_energy(parts_, report);
-    warn_of_cost(parts_, report);
-  }
   for (const std::string& note : parts_.interfaces ? parts_.interfaces->notes : std::vector<std::string>()) report.notes.emplace_back("interfaces", note);
   for (const auto& term : terms_) term->report(report);
   return report;

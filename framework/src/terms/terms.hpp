@@ -1,43 +1,31 @@
 #pragma once
 /// All that acts inside of a body: laws at evaluation points or pair forces, zero-energy penalties, and what may be added to them. Their sum
-/// as a problem sees it: energies, forces, tangent actions, assembled tangents, sampled point fields, and bonds that fail.
+/// as a problem sees it: energies, forces, tangent actions, assembled tangents, and sampled point fields.
 
 #include <functional>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "families/bonds.hpp"
-#include "fracture/step_inside.hpp"
 #include "model/formulation.hpp"
-#include "operators/group_energy.hpp"
-#include "operators/material_points.hpp"
-#include "operators/report.hpp"
-#include "operators/samples.hpp"
 #include "perikit/core/block_matrix.hpp"
 #include "perikit/core/evaluation_status.hpp"
 #include "perikit/core/exact_sum.hpp"
-#include "perikit/model/configuration.hpp"
 #include "perikit/model/stabilization.hpp"
 #include "perikit/operators/laws.hpp"
+#include "terms/term.hpp"
 
 namespace perikit {
 
-class BondCriterion;
-enum class Drive : int;
 class Body;
-class Families;
 struct CloudConsistency;
 struct Interfaces;
-class StatefulTerm;
-class Term;
-class VolumetricRows;
 
 struct TermParts;
 /// Makes a term (terms/term.hpp) of what those of the formulation are made of.
 using TermMaker = std::function<std::unique_ptr<Term>(const TermParts&)>;
 
-/// What the terms of a formulation are made of. families, laws and damage must outlive them.
+/// What the terms of a formulation are made of. families and laws must outlive them.
 struct TermParts {
   Families* families = nullptr;
   Formulation formulation;
@@ -45,39 +33,40 @@ struct TermParts {
   std::shared_ptr<const Stabilization> stabilization;  ///< null: none. Only over point gradients
   bool skip = true;                                    ///< leave out work whose result is known; changes no bit
   bool share = true;                                   ///< savings by symmetry and uniformity; change rounding
-  const BodyDamage* damage = nullptr;                  ///< null: bonds never fail
   std::shared_ptr<const Interfaces> interfaces;        ///< where materials meet as laminates; null: nowhere
   std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
   std::vector<TermMaker> further;                      ///< what acts beside the formulation
-};
-
-/// The points that are meant, by point; and by group of eight points (internal index / 8) those whose evaluation points act on these, and where
-/// these need point gradients.
-struct GroupRings {
-  std::vector<std::uint8_t> inside, only, near;
 };
 
 class Terms {
  public:
   explicit Terms(TermParts parts);
   ~Terms();
+  const TermParts& parts() const noexcept { return parts_; }
+  /// Those of the formulation first.
+  std::span<const std::unique_ptr<Term>> all() const noexcept { return terms_; }
+  /// Every evaluation of forces marks the bonds that may hold too much energy, from now on; null: no longer. It must outlive these evaluations.
+  void screen_bonds(BondScreen* screen) noexcept { screen_ = screen; }
 
   /// force <- -dE/du [N] (conservative terms), fully overwritten; E of all ranks -> *energy where wanted. Displacements that are on their way have
   /// come when it returns; a motion of the configuration leaves force zero.
   EvaluationStatus forces(const Configuration& at, FieldView force, double* energy);
   /// `forces` and `sample` of the same configuration, bit for bit; where evaluation points are those of both, each is visited once.
   EvaluationStatus forces_and_samples(const Configuration& at, FieldView force, double* energy, PointSamples& samples);
-  /// The same where `force` holds the forces before the points `moved` went to where they are now and those of `lost` lost bonds:
+  /// sum += factor times the forces of a region with its gradients, where these are; without data nothing is added. Returns their energy over all ranks [J]: not a
+  /// number, and nothing is added, where a point is inadmissible. What is left out is the same whichever bonds have failed. No step ends: nothing is kept. All ranks
+  /// must call it.
+  double add_forces(const Configuration& at, const Region& region, double factor, FieldView sum);
+  /// `forces` where `force` holds the forces before the points `moved` went to where they are now and those of `lost` lost bonds:
   /// what has not changed is left as it is, what has has the same bits. With an energy, those forces must have come with theirs.
   /// On one rank.
   EvaluationStatus renew_forces(const Configuration& at, std::span<const std::int32_t> moved, std::span<const std::int32_t> lost,
                                 FieldView force, double* energy);
-  /// The points whose bonds failed or weakened in the last update, on any number of ranks the same; empty where none did, or where
-  /// their families are left with so much that their gradients are no stiffer than before.
-  GroupRings near_failed_bonds() const;
-  /// Kw <- -d(force)/du w [N], fully overwritten. Of rings those of their points alone, bit for bit the same, where w is 0 on all others; anything
-  /// elsewhere.
-  EvaluationStatus tangent(const Configuration& at, ConstFieldView w, FieldView Kw, const GroupRings* rings = nullptr);
+  /// Kw <- -d(force)/du w [N], fully overwritten. Of a region those of points all of whose evaluation points lie there alone, bit for bit the same, where w is 0
+  /// outside of it; anything elsewhere.
+  EvaluationStatus tangent(const Configuration& at, ConstFieldView w, FieldView Kw, const Region& region = {});
+  /// The tangent couples two points only where a chain of at most so many bonds joins them.
+  int coupling_reach() const;
   /// K <- -d(force)/du [N/m] over all live points, constrained ones too. The pattern is made where K has none; one that K has must come
   /// from these terms and stays as it is. Values are overwritten; undefined after a failure.
   EvaluationStatus assemble(const Configuration& at, BlockMatrix& K);
@@ -90,7 +79,6 @@ class Terms {
   /// That an evaluation of this term, or of the first one, met this inadmissible point (field index), or none (-1).
   EvaluationStatus status(std::int64_t bad, const Term* term = nullptr) const;
   const Body& body() const noexcept;
-  bool bonds_may_fail() const noexcept { return parts_.damage != nullptr; }
   /// sum += energies of the groups of eight points of the body that this rank owns.
   void add_owned(std::span<const GroupEnergy> energies, double GroupEnergy::* which, ExactSum& sum) const;
 
@@ -129,46 +117,17 @@ class Terms {
   /// force <- those forces alone [N], fully overwritten; their energy over all ranks -> energy.
   EvaluationStatus driven_forces(const Configuration& at, Drive drive, FieldView force, double& energy);
 
-  // With [damage]. Bonds change here and nowhere else; without damage all of this is empty.
-  /// Lowers the integrity of bonds that are beyond their limit, and recomputes what depends on them. To be called after
-  /// every step, with its length [s] (0 in later rounds of quasi-static steps). Where `step` is given, bonds fail inside of it, and displacements follow what it does.
-  BondUpdate update_bonds(const Configuration& at, double elapsed = 0, const StepInside& step = {});
-  // Bonds that weakened in the last update outside of a step: see WeakeningBonds.
-  /// Whether some of them may be forecast.
-  bool settling() const noexcept;
-  /// Whether somebody else forecasts how far bonds weaken; else updates do.
-  void let_others_forecast(bool to_others);
-  /// force <- force + df/db (db/du . w) at the displacement of that update.
-  EvaluationStatus weakening_forces(const Configuration& at, ConstFieldView w, FieldView force);
-  /// Lowers them to what they are at `forecast`, and not by more than half; energies are those of `at`.
-  BondUpdate weaken_bonds(const Configuration& at, ConstFieldView forecast);
-  /// The shares of all bonds in the energy: they add up to it. Ascending. Not where laws have a history.
-  std::vector<BondEnergy> bond_energies(const Configuration& at);
-  /// dE/db_ij of all bonds with displacements held. Ascending. Throws std::logic_error for kinematics of which it is not known (see
-  /// DamageTraits::released).
-  std::vector<BondEnergy> released_energies(const Configuration& at);
-  /// Every bond here that is not as it was at the set-up.
-  std::vector<BondChange> changed_bonds() const;
-  void restore_bonds(std::span<const BondChange> changes);
-  /// Those that no other rank owns, as all ranks name them: run state, for checkpoints. Ascending.
-  std::vector<NamedChange> own_changed_bonds() const;
-  /// Of changes in the whole body those of bonds with both ends here.
-  std::vector<BondChange> bonds_here(std::span<const NamedChange> changes) const;
-  BondChecks bond_checks() const;
-
  private:
   template <class Add>
   EvaluationStatus forces_by(Add&& add, const Configuration& at, FieldView force, double* energy);
   /// visit(term) until one returns an inadmissible point.
   template <class Visit>
   EvaluationStatus each_term(Visit&& visit);
-  int coupling_reach() const;
   StatefulTerm* stateful() const noexcept;
   std::size_t groups() const noexcept;
   class PointBlocks;
   struct Assemblies;
-  struct Failing;
-  void bonds_changed(std::span<const std::int32_t> points);
+  FieldView work_field(int components);
   Assemblies& assemblies();
 
   TermParts parts_;
@@ -176,8 +135,8 @@ class Terms {
   std::vector<std::vector<GroupEnergy>> energies_;  ///< by term, of the last evaluation that asked for them
   ExactSum dissipated_;                             ///< in the step that the last evaluation of forces ended
   std::unique_ptr<Assemblies> assemblies_;  ///< made when asked for
-  std::unique_ptr<Failing> failing_;        ///< null without [damage]
-  BondCriterion* criterion_ = nullptr;      ///< of failing_, where evaluations of forces tell it which bonds need a look
+  BondScreen* screen_ = nullptr;
+  Field work_;                              ///< made when asked for
 };
 
 }  // namespace perikit

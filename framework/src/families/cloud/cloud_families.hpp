@@ -21,7 +21,6 @@ class CloudFamilies final : public Families {
   double integrity(BondId bond) const noexcept override;
   std::vector<BondChange> changed() const override;
   void mark(std::span<const std::int32_t> points, GroupMarks& marks) const override;
-  std::unique_ptr<BondMonitor> make_monitor(const BodyDamage& damage, bool skip, const NearestFailure* known) const override;
   std::size_t bytes() const noexcept override;
 
   // What loops over bonds read.

@@ -1,11 +1,12 @@
 #pragma once
-/// From [damage] to what terms and a problem are told of bonds that fail.
+/// From [damage] to the limits of bonds.
 
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "body/partition/partition.hpp"
+#include "fracture/body_damage.hpp"
 #include "perikit/plugin/part.hpp"
 #include "perikit/problem/image_map.hpp"
 #include "scene/scene.hpp"

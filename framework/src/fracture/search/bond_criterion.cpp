@@ -1,9 +1,13 @@
 #include "fracture/search/bond_criterion.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
+#include "cloud_balance/consistency.hpp"
 #include "core/each_once.hpp"
 #include "families/bond_stretch.hpp"
 #include "families/cloud/cloud_families.hpp"
@@ -25,18 +29,19 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, const BodyDamage* damage, TermsOf terms, bool skip)
-    : families_(parts.families),
-      body_(parts.families.body()),
-      formulation_(parts.formulation),
+BondCriterion::BondCriterion(const Terms& terms, DamageTraits asked, const BodyDamage* damage)
+    : families_(*terms.parts().families),
+      body_(families_.body()),
+      formulation_(terms.parts().formulation),
       damage_(damage),
       copies_(damage ? damage->copies.get() : nullptr),
-      terms_(terms),
-      skip_(skip),
+      terms_(terms.all()),
+      skip_(terms.parts().skip),
       traits_(asked),
       by_point_(!formulation_.pairs && formulation_.parts(body_.dimension()) > 0),
       samples_(body_.space(), traits_.released ? BondSampling::derivative : traits_.stress ? BondSampling::stress : BondSampling::energy) {
-  if (traits_.released) release_.emplace(parts);
+  const auto image = [&](std::int32_t p) { return body_.image(static_cast<std::size_t>(p)); };
+  if (traits_.released) release_.emplace(terms.parts(), copies_ || std::ranges::any_of(body_.internal(), image));
   const std::size_t count = body_.stride() / padding;
   for (std::size_t g = 0; g < count; ++g) {
     bool any = false;
@@ -45,7 +50,7 @@ BondCriterion::BondCriterion(const ReleaseParts& parts, DamageTraits asked, cons
   }
   own_.assign(count, 0);
   looked_at_.assign(count, whole_group);
-  if (damage && traits_.bound != ValueBound::none) set_screen(parts.factors);
+  if (damage && traits_.bound != ValueBound::none) set_screen(terms.parts().consistency ? std::span<const double>(terms.parts().consistency->factors) : std::span<const double>());
 }
 
 /// Each term may have the same part of what a point holds.
@@ -57,9 +62,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
   const Field& onset = damage_->onset;
   FamilyArrays family;
   AlignedVector<double> share;
-  screen_.limit = infinite;
-  for (const std::int32_t p : body_.internal()) screen_.limit = std::min(screen_.limit, onset.data()[p]);
-  for (const InterfaceDamage& i : damage_->interfaces) screen_.limit = std::min(screen_.limit, i.least());
+  screen_.limit = damage_->least_onset(body_.internal());
   // A bond to an image stores half of what it holds.
   if (copies_ && formulation_.pairs) screen_.limit *= 0.5;
   screen_.over_share = traits_.bound == ValueBound::energy_over_share;
@@ -107,27 +110,15 @@ BondScreen* BondCriterion::screen() noexcept {
   return screen_.near.empty() || !(skip_ || release_) ? nullptr : &screen_;
 }
 
-void BondCriterion::begin_forces() {
-  screen_.known = false;
-  std::fill(screen_.near.begin(), screen_.near.end(), std::uint8_t{0});
-  screen_.bonds.resize(static_cast<std::size_t>(thread_count()));
-  for (auto& bonds : screen_.bonds) bonds.clear();
-}
-
-void BondCriterion::end_forces(ConstFieldView u) {
-  screen_.u.assign(u.data, u.data + u.size());
-  screen_.known = true;
-}
-
 /// Statics look for bonds at displacements that need not be those of their last evaluation.
 void BondCriterion::mark_by_forces(const Configuration& at) {
   const ConstFieldView u = at.u();
-  if (!marked_by_forces_ || known_at(u)) return;
+  if (!screen() || screen_.known_at(u)) return;
   clear_forces(u.components);
-  begin_forces();
+  screen_.begin();
   for (const auto& term : terms_)
-    if (term->forces(at.moved_to(u), {}, {forces_}) >= 0) return;
-  end_forces(u);
+    if (term->forces(at.moved_to(u), {}, {.force = forces_, .screen = &screen_}) >= 0) return;
+  screen_.end(u);
 }
 
 void BondCriterion::clear_forces(int components) {
@@ -162,7 +153,7 @@ std::span<const BondId> BondCriterion::named_in(std::int32_t first_group, std::i
 
 /// The points with bonds that may fail at u.
 GroupMarks BondCriterion::near_failure(const Configuration& at) {
-  const bool known = known_at(at.u());
+  const bool known = screen_.known_at(at.u());
   if (known && terms_.size() == 1) return screen_.near;
   if (!by_point_ || screen_.near.empty()) return known ? screen_.near : GroupMarks(own_.size(), whole_group);
   // What points hold of all terms is cheaper than a look at their bonds.
@@ -237,14 +228,13 @@ void BondCriterion::find_flux(std::span<const std::int32_t> groups, const Config
   if (!release_ || copies_ || !release_->follows_from_flux() || groups.empty()) return;
   const ConstFieldView u = at.u();
   BreakableTerm& bonds = *terms_.front()->breakable();
-  if (known_at(u)) flux_ = bonds.point_flux();
+  if (screen_.known_at(u)) flux_ = bonds.point_flux();
   if (flux_.everywhere) return;
   flux_ = {};
   // The points of their families, and whatever has a bond with those.
-  const GroupMarks marks = families_.around(families_.around(looked_at(groups)));
+  const MarkedRegion region(families_, families_.around(families_.around(looked_at(groups))));
   clear_forces(u.components);
-  const GroupMarks near = families_.around(marks);
-  if (terms_.front()->forces(at.moved_to(u), {&marks, &near}, {forces_}) < 0) flux_ = bonds.point_flux();
+  if (terms_.front()->forces(at.moved_to(u), region, {forces_}) < 0) flux_ = bonds.point_flux();
 }
 
 /// Of the evaluation points of these owners; kept: see BondSamples::clear.
@@ -369,7 +359,7 @@ std::vector<BondChange> BondCriterion::find(const Configuration& at) {
   found_at_ = u.data;
   if (release_) mark_by_forces(at);
   named_.clear();
-  const bool by_bond = (skip_ || release_) && screen_.by_bond() && known_at(u);
+  const bool by_bond = (skip_ || release_) && screen_.by_bond() && screen_.known_at(u);
   if (by_bond) {
     name_near_failure();
     look_at_named();
@@ -459,6 +449,12 @@ std::vector<BondEnergy> BondCriterion::energies(const Configuration& at) {
   flux_ = {};
   keep_each_once(all, &BondEnergy::bond);
   return all;
+}
+
+std::vector<BondEnergy> bond_energies(const Terms& terms, const Configuration& at, bool released) {
+  if (const char* const reason = released ? BondRelease::unknown(terms.parts()) : nullptr)
+    throw std::logic_error(fmt::format("what bonds set free is not known {}", reason));
+  return BondCriterion(terms, {.energy = true, .released = released}, nullptr).energies(at);
 }
 
 }  // namespace perikit

@@ -7,23 +7,25 @@
 #include <span>
 #include <vector>
 
-#include "families/families.hpp"
+#include "fracture/body_damage.hpp"
 #include "fracture/bond_copies.hpp"
 #include "fracture/search/bond_finder.hpp"
 #include "fracture/search/bond_release.hpp"
-#include "model/formulation.hpp"
-#include "operators/bond_samples.hpp"
-#include "operators/bond_screen.hpp"
-#include "terms/term.hpp"
+#include "terms/terms.hpp"
 
 namespace perikit {
 
+/// What a bond has of the stored energy.
+struct BondEnergy {
+  BondId bond;
+  double energy = 0;  ///< [J]
+};
+
 class BondCriterion final : public BondFinder {
  public:
-  using TermsOf = std::span<const std::unique_ptr<Term>>;
-  /// All must outlive this. asked: what is looked at, that of the criterion. damage: null for energies alone. skip = false: every
+  /// Both must outlive this. asked: what is looked at, that of the criterion. damage: null for energies alone. Where the terms skip nothing it looks at every
   /// bond in every step, save for those that hold too little to fail by what they set free.
-  BondCriterion(const ReleaseParts& parts, DamageTraits asked, const BodyDamage* damage, TermsOf terms, bool skip);
+  BondCriterion(const Terms& terms, DamageTraits asked, const BodyDamage* damage);
 
   std::vector<BondChange> find(const Configuration& at) override;
   void values(std::span<const BondId> bonds, const Configuration& at, std::span<double> values) override;
@@ -33,13 +35,8 @@ class BondCriterion final : public BondFinder {
   std::size_t bytes() const noexcept override {
     return samples_.bytes() + forces_.bytes() + 5 * own_.size() + near_.size() + (screen_.density.size() + screen_.of_bonds.size() + screen_.u.size()) * sizeof(double);
   }
-  /// For evaluations of forces to mark the groups that need a look; null where they cannot, or need not.
+  /// For evaluations of forces to mark the bonds that need a look; null where they cannot, or need not.
   BondScreen* screen() noexcept;
-  /// All evaluations of forces do.
-  void forces_mark() noexcept { marked_by_forces_ = true; }
-  /// Before and after an evaluation of forces at u where they do.
-  void begin_forces();
-  void end_forces(ConstFieldView u);
   /// Of all bonds, ascending: what they hold, or dE/db.
   std::vector<BondEnergy> energies(const Configuration& at);
 
@@ -57,8 +54,6 @@ class BondCriterion final : public BondFinder {
 
   void set_screen(std::span<const double> factors);
   bool looks_at(std::size_t p) const noexcept { return marked(own_, p) && marked(looked_at_, p); }
-  /// Whether the last evaluation of forces with a screen was at u.
-  bool known_at(ConstFieldView u) const noexcept { return screen_.known && std::equal(u.data, u.data + u.size(), screen_.u.begin()); }
   GroupMarks near_failure(const Configuration& at);
   void name_near_failure();
   /// The named bonds, at their lower ends.
@@ -96,9 +91,8 @@ class BondCriterion final : public BondFinder {
   const Formulation& formulation_;
   const BodyDamage* damage_;
   const BondCopies* copies_;  ///< null: the body has no images
-  TermsOf terms_;
+  std::span<const std::unique_ptr<Term>> terms_;
   bool skip_;
-  bool marked_by_forces_ = false;
   DamageTraits traits_;
   bool by_point_;  ///< evaluation points belong to points
   BondSamples samples_;
@@ -121,5 +115,9 @@ class BondCriterion final : public BondFinder {
   std::vector<Found> found_;          ///< by the last `find`, ascending
   const double* found_at_ = nullptr;  ///< its displacement
 };
+
+/// What all bonds have of the stored energy, which adds up to it; not where laws have a history. released: dE/db_ij with displacements held; throws
+/// std::logic_error for kinematics of which it is not known (see DamageTraits::released). Ascending.
+std::vector<BondEnergy> bond_energies(const Terms& terms, const Configuration& at, bool released = false);
 
 }  // namespace perikit

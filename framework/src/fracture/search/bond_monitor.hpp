@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,11 @@
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
+
+struct BodyDamage;
+class CloudFamilies;
+class LatticeFamilies;
+struct NearestFailure;
 
 class BondMonitor : public BondFinder {
  public:
@@ -72,6 +78,10 @@ class BondMonitor : public BondFinder {
   std::vector<std::size_t> checks_;                 ///< by cell, of one call
   std::size_t checked_ = 0;
 };
+
+std::unique_ptr<BondFinder> make_lattice_monitor(const LatticeFamilies& families, const BodyDamage& damage, bool skip);
+/// known: what a loop over forces leaves behind; null: nothing.
+std::unique_ptr<BondFinder> make_cloud_monitor(const CloudFamilies& families, const BodyDamage& damage, bool skip, const NearestFailure* known);
 
 template <class Visit>
 void BondMonitor::over_cells(Visit&& visit) const {

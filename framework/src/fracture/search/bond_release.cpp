@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cloud_balance/consistency.hpp"
 #include "cloud_balance/shift.hpp"
 #include "core/dimension.hpp"
 #include "families/cloud/cloud_families.hpp"
@@ -110,14 +111,26 @@ struct BondRelease::Memory {
   }
 };
 
-BondRelease::BondRelease(const ReleaseParts& parts)
+BondRelease::BondRelease(const TermParts& parts, bool images)
     : parts_(parts),
-      one_state_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(parts.laws)),
-      mirrored_(one_state_ && parts.factors.empty() && !parts.images),
-      through_point_gradient_(!parts.formulation.weighted || parts.formulation.selective()) {}
+      one_state_(parts.formulation.pair_symmetric && !parts.formulation.selective() && one_law(*parts.laws)),
+      through_point_gradient_(!parts.formulation.weighted || parts.formulation.selective()) {
+  if (parts.consistency) factors_ = parts.consistency->factors;
+  if (parts.consistency && parts.consistency->shift.components() > 0) shift_ = parts.consistency->shift;
+  mirrored_ = one_state_ && factors_.empty() && !images;
+}
 BondRelease::~BondRelease() = default;
 
-const char* BondRelease::unknown(const Formulation& f, int dimension, bool stabilized) {
+DamageTraits asked_of_bonds(const TermParts& parts, const Damage& criterion) {
+  DamageTraits traits = criterion.traits();
+  traits.released = traits.released && traits.energy && !traits.stress && !BondRelease::unknown(parts);
+  return traits;
+}
+
+const char* BondRelease::unknown(const TermParts& parts) {
+  const Formulation& f = parts.formulation;
+  const int dimension = parts.families->body().dimension();
+  const bool stabilized = parts.stabilization != nullptr;
   if (f.pairs) return "of pair laws";
   if (f.selective() && f.weighted && f.parts(dimension) > 0) return "of selective gradients of parts of families";
   if (f.selective() && f.order > 1) return "of selective gradients of orders above 1";
@@ -139,18 +152,18 @@ double BondRelease::of(std::int32_t p, std::int32_t far) const noexcept {
 
 bool BondRelease::follows_from_flux() const noexcept {
   const Formulation& f = parts_.formulation;
-  return one_state_ && f.bond && f.g_from_xi_only && !f.weighted && f.order == 1 && !parts_.stabilization && !parts_.shift.data;
+  return one_state_ && f.bond && f.g_from_xi_only && !f.weighted && f.order == 1 && !parts_.stabilization && !shift_.data;
 }
 
 /// dE/dH : (z (x) g)/b with g = b omega V K^-1 xi is omega z . Q d on a lattice, Q the flux and d the bond in cells, and omega V z . Q xi on a cloud; the far
 /// end sees -z and -d.
 void BondRelease::of(std::int32_t p, const FamilyArrays& family, std::span<const std::size_t> bonds, ConstFieldView u, const PointFlux& flux,
                      const BondSamples& samples, double* released) const noexcept {
-  const LatticeFamilies* const lattice = parts_.families.lattice();
+  const LatticeFamilies* const lattice = parts_.families->lattice();
   const int dimension = family.dimension;
-  const auto normaliser = [&](std::int32_t of) { return parts_.families.normaliser(static_cast<std::size_t>(of), parts_.formulation.weight); };
+  const auto normaliser = [&](std::int32_t of) { return parts_.families->normaliser(static_cast<std::size_t>(of), parts_.formulation.weight); };
   const auto factor = [&](std::int32_t owner, std::int32_t far) {
-    return parts_.factors.empty() ? 1.0 : parts_.factors[static_cast<std::size_t>(parts_.families.cloud()->index(owner, far))];
+    return factors_.empty() ? 1.0 : factors_[static_cast<std::size_t>(parts_.families->cloud()->index(owner, far))];
   };
   const double own = normaliser(p);
   for (const std::size_t k : bonds) {
@@ -166,7 +179,7 @@ void BondRelease::of(std::int32_t p, const FamilyArrays& family, std::span<const
         }
         of_end += z * t;
       }
-      sum += lattice ? of_end / lattice->spacing : of_end * parts_.families.body().volume(static_cast<std::size_t>(end == p ? far : p));
+      sum += lattice ? of_end / lattice->spacing : of_end * parts_.families->body().volume(static_cast<std::size_t>(end == p ? far : p));
     }
     sum *= family.whole_omega(k);
     if (const BondSamples::Entry* const entry = samples.find(p, far))
@@ -176,7 +189,7 @@ void BondRelease::of(std::int32_t p, const FamilyArrays& family, std::span<const
 }
 
 void BondRelease::find(ConstFieldView u, const GroupMarks& near, const GroupMarks& wide, const WantedBonds& wanted, const BondSamples& samples) {
-  const Body& body = parts_.families.body();
+  const Body& body = parts_.families->body();
   for (std::size_t k = 0; k < count_; ++k) place_[static_cast<std::size_t>(owners_[k].point)] = -1;
   place_.resize(body.stride(), -1);
   while (static_cast<int>(memory_.size()) < thread_count()) memory_.push_back(std::make_unique<Memory>());
@@ -223,7 +236,7 @@ void BondRelease::find_bonds(ConstFieldView u, const GroupMarks& near, const Wan
 
 template <int D>
 void BondRelease::load(std::int32_t point, Memory& m) const {
-  parts_.families.load(static_cast<std::size_t>(point), BondsOf::intact, m.family);
+  parts_.families->load(static_cast<std::size_t>(point), BondsOf::intact, m.family);
   const FamilyArrays& family = m.family;
   const std::size_t n = family.far.size();
   m.xi.resize(D * n);
@@ -235,7 +248,7 @@ template <int D>
 void BondRelease::correct(Memory& m) const {
   const FamilyArrays& family = m.family;
   m.correction.resize(D * family.size);
-  parts_.formulation.bond->correction(family.view(parts_.families.body().horizon()), m.correction.data(), family.size);
+  parts_.formulation.bond->correction(family.view(parts_.families->body().horizon()), m.correction.data(), family.size);
   m.g.resize(D * family.far.size());
   for (std::size_t k = 0; k < family.far.size(); ++k)
     for (std::size_t e = 0; e < D; ++e) m.g[D * k + e] = m.correction[e * family.size + k];
@@ -253,14 +266,14 @@ void BondRelease::find_gradient(std::int32_t point, ConstFieldView u, Memory& m)
     }
   if (!through_point_gradient_ && !parts_.stabilization) return;
   // z is that of the least squares, whether the gradient is shifted or not; the shift changes H and g alone.
-  const double horizon = parts_.families.body().horizon();
+  const double horizon = parts_.families->body().horizon();
   const int order = point_gradient(m.family, horizon, parts_.formulation.order, m.gradient);
   sum_gradient<D>(n, m.u.data(), m.gradient.data(), m.H);
   if (parts_.formulation.order > 1) return kernel_residuals(m.family, horizon, order, m.u, m.z);
   m.z = m.u;
   for (std::size_t k = 0; k < n; ++k) subtract<D>(m.H, &m.xi[D * k], &m.z[D * k]);
-  if (!parts_.shift.data) return;
-  shift_gradient(m.family, parts_.shift, m.gradient);
+  if (!shift_.data) return;
+  shift_gradient(m.family, shift_, m.gradient);
   sum_gradient<D>(n, m.u.data(), m.gradient.data(), m.H);
 }
 
@@ -303,7 +316,7 @@ void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) c
 
 void BondRelease::release_weight(Owner& owner, double stored, const Memory& m) const {
   const auto p = static_cast<std::size_t>(owner.point);
-  const double left = (1 - parts_.families.damage(p)) * parts_.families.normaliser(p, BondWeight::kernel);
+  const double left = (1 - parts_.families->damage(p)) * parts_.families->normaliser(p, BondWeight::kernel);
   for (std::size_t k = 0; k < owner.far.size() && left > 0; ++k)
     owner.released[k] += stored * m.family.whole_omega(k) * m.family.volume[k] / left;
 }
@@ -314,7 +327,7 @@ void BondRelease::release_parts(Owner& owner, const BondSamples& samples, Memory
   const std::size_t n = owner.far.size();
   if (n == 0) return;
   LocalStencil<D>& stencil = m.stencil<D>();
-  stencil.build({&parts_.formulation, parts_.families.body().horizon()}, m.family, nullptr, 0, nullptr);
+  stencil.build({&parts_.formulation, parts_.families->body().horizon()}, m.family, nullptr, 0, nullptr);
   std::vector<double>& g = m.weighted;
   g.resize(n * D);
   double stored = 0;
@@ -328,8 +341,8 @@ void BondRelease::release_parts(Owner& owner, const BondSamples& samples, Memory
     double H[D * D];
     sum_gradient<D>(n, m.u.data(), g.data(), H);
     // The shift moves the gradient, not what the fit leaves.
-    if (parts_.shift.data)
-      each_shift<D>(m.family, influence, g.data(), parts_.shift, 0, [&](std::size_t k, std::size_t e, double d) { g[k * D + e] += d; });
+    if (shift_.data)
+      each_shift<D>(m.family, influence, g.data(), shift_, 0, [&](std::size_t k, std::size_t e, double d) { g[k * D + e] += d; });
     for (const std::size_t k : m.wanted) {
       if (influence[k] == 0) continue;
       double z[D];
@@ -344,12 +357,12 @@ void BondRelease::release_parts(Owner& owner, const BondSamples& samples, Memory
 template <int D>
 void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory& m, double* S) const {
   const double share = parts_.formulation.far_share;
-  const auto normaliser = [&](std::int32_t p) { return parts_.families.normaliser(static_cast<std::size_t>(p), parts_.formulation.weight); };
+  const auto normaliser = [&](std::int32_t p) { return parts_.families->normaliser(static_cast<std::size_t>(p), parts_.formulation.weight); };
   const double of_owner = mirrored_ ? normaliser(owner.point) : 0.0;
   for (std::size_t k = 0; k < owner.far.size(); ++k) {
     const double* const own = &owner.onto[k * D * D];
     const auto near = static_cast<std::size_t>(owner.point), other_end = static_cast<std::size_t>(owner.far[k]);
-    const double here = end_shares(parts_.families, share, near, other_end).near, there = end_shares(parts_.families, share, other_end, near).far;
+    const double here = end_shares(*parts_.families, share, near, other_end).near, there = end_shares(*parts_.families, share, other_end, near).far;
     const double both = here + (mirrored_ ? there * of_owner / normaliser(owner.far[k]) : 0.0);
     for (int c = 0; c < D * D; ++c) S[c] += both * own[c];
     if (there > 0 && !mirrored_) {
@@ -363,7 +376,7 @@ void BondRelease::release_bonds(Owner& owner, const BondSamples& samples, Memory
 
 template <int D>
 void BondRelease::release_shares(Owner& owner, const BondSamples& samples, const Memory& m, double* S) const {
-  const double left = parts_.families.remaining_influence(static_cast<std::size_t>(owner.point));
+  const double left = parts_.families->remaining_influence(static_cast<std::size_t>(owner.point));
   double pressure = 0, by_share = 0;
   EntriesOf entries(samples, owner.point);
   for (std::size_t k = 0; k < owner.far.size(); ++k) {
@@ -381,15 +394,15 @@ void BondRelease::release_volume(Owner& owner, double pressure, double by_share,
   double H[9 * padding] = {}, pressures[padding] = {}, stress[9 * padding] = {};
   for (std::size_t c = 0; c < D * D; ++c) H[c * padding] = m.H[c];
   pressures[0] = pressure;
-  add_owner_stress(parts_.laws.space(), {static_cast<int>(padding), padding, H, nullptr}, pressures, nullptr, stress, padding);
+  add_owner_stress(parts_.laws->space(), {static_cast<int>(padding), padding, H, nullptr}, pressures, nullptr, stress, padding);
   for (std::size_t c = 0; c < D * D; ++c) S[c] += stress[c * padding];
   // The share c of the volume is that of the influence that is left.
   const auto p = static_cast<std::size_t>(owner.point);
   double influence = 0;
   for (std::size_t k = 0; k < owner.far.size(); ++k) influence += m.family.omega[k] * m.family.volume[k];
-  if (!std::isfinite(parts_.families.condition(p)) || !(influence > 0)) return;
+  if (!std::isfinite(parts_.families->condition(p)) || !(influence > 0)) return;
   for (std::size_t k = 0; k < owner.far.size(); ++k)
-    owner.released[k] += by_share * m.family.whole_omega(k) * m.family.volume[k] * parts_.families.remaining_influence(p) / influence;
+    owner.released[k] += by_share * m.family.whole_omega(k) * m.family.volume[k] * parts_.families->remaining_influence(p) / influence;
 }
 
 /// Corrections that follow from the shape tensor and the influence of the bonds.
@@ -398,7 +411,7 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
   FamilyArrays& family = m.family;
   const auto p = static_cast<std::size_t>(owner.point);
   const std::size_t n = owner.far.size(), size = family.size;
-  const double horizon = parts_.families.body().horizon(), share = parts_.formulation.far_share;
+  const double horizon = parts_.families->body().horizon(), share = parts_.formulation.far_share;
   double inverse[6];
   std::copy_n(family.inverse_shape, 6, inverse);
   if (inverse[0] == 0) return;
@@ -411,7 +424,7 @@ void BondRelease::release_corrections(Owner& owner, const BondSamples& samples, 
     if (!entry) continue;
     double A[D * D], z[D];
     const double* const other = share > 0 ? owner_of(owner.far[k]).H : m.H;
-    const EndShares shares = end_shares(parts_.families, share, p, static_cast<std::size_t>(owner.far[k]));
+    const EndShares shares = end_shares(*parts_.families, share, p, static_cast<std::size_t>(owner.far[k]));
     for (int c = 0; c < D * D; ++c) A[c] = shares.near * m.H[c] + shares.far * other[c];
     std::copy_n(&m.u[D * k], D, z);
     subtract<D>(A, &m.xi[D * k], z);
@@ -454,9 +467,9 @@ void BondRelease::release_weighted(Owner& owner, const BondSamples& samples, Mem
   const FamilyArrays& family = m.family;
   const std::size_t n = owner.far.size();
   if (n == 0) return;
-  bond_shares(parts_.families, p, parts_.formulation.weight, family, m.shares);
+  bond_shares(*parts_.families, p, parts_.formulation.weight, family, m.shares);
   LocalStencil<D>& stencil = m.stencil<D>();
-  stencil.build({&parts_.formulation, parts_.families.body().horizon()}, family, m.shares.data(), 0, nullptr);
+  stencil.build({&parts_.formulation, parts_.families->body().horizon()}, family, m.shares.data(), 0, nullptr);
   stencil.expand(m.weighted);
   const std::size_t owners = parts_.formulation.selective() ? 1 : 0;
   EntriesOf entries(samples, owner.point);
@@ -480,10 +493,10 @@ template <int D>
 void BondRelease::release_penalty(Owner& owner, Memory& m) const {
   const auto p = static_cast<std::size_t>(owner.point);
   const FamilyArrays& family = m.family;
-  if (!penalised(parts_.families.condition(p))) return;
+  if (!penalised(parts_.families->condition(p))) return;
   const std::size_t n = owner.far.size();
   const bool isotropic = D == 1 || parts_.stabilization->traits().isotropic;
-  const double volume = parts_.families.body().volume(p);
+  const double volume = parts_.families->body().volume(p);
   double intact = 0, squares[D * D] = {};  // sum of omega V z (x) z
   for (std::size_t k = 0; k < n; ++k) {
     const double w = family.omega[k] * family.volume[k];
@@ -500,7 +513,7 @@ void BondRelease::release_penalty(Owner& owner, Memory& m) const {
   };
   const double* const inverse = family.inverse_shape;
   const auto penalty = [&](const double* of_inverse, double* M) {
-    parts_.stabilization->penalty(penalty_point(parts_.families, parts_.laws, p, intact, of_inverse), M);
+    parts_.stabilization->penalty(penalty_point(*parts_.families, *parts_.laws, p, intact, of_inverse), M);
   };
   double M[6], slope[D * D] = {};  // dE/dK^-1_ab over V_i/2, a <= b
   penalty(inverse, M);

@@ -13,26 +13,15 @@
 #include <span>
 #include <vector>
 
-#include "families/bonds.hpp"
-#include "families/families.hpp"
-#include "model/formulation.hpp"
 #include "operators/bond_samples.hpp"
 #include "operators/point_flux.hpp"
-#include "perikit/model/stabilization.hpp"
-#include "perikit/operators/laws.hpp"
+#include "perikit/model/damage.hpp"
+#include "terms/terms.hpp"
 
 namespace perikit {
 
-/// All must outlive what is made of them.
-struct ReleaseParts {
-  const Families& families;
-  const Formulation& formulation;
-  const Laws& laws;
-  const Stabilization* stabilization;  ///< may be null
-  ConstFieldView shift;                ///< of point gradients (spaces/cloud_gradient.hpp); without data: none
-  std::span<const double> factors;     ///< of the weights of evaluation points (EvaluationSpace::set_factors); empty: 1
-  bool images = false;                 ///< images store nothing, so that one direction of a bond does not stand for both
-};
+/// What a criterion looks at with these terms.
+DamageTraits asked_of_bonds(const TermParts& parts, const Damage& criterion);
 
 /// Bonds of which it is asked what they set free: those that are named, ascending; or all with an end in `ends`.
 struct WantedBonds {
@@ -46,10 +35,11 @@ struct WantedBonds {
 
 class BondRelease {
  public:
-  /// Why it is not known of this formulation; null where it is.
-  static const char* unknown(const Formulation& formulation, int dimension, bool stabilized);
+  /// Why it is not known of these terms; null where it is.
+  static const char* unknown(const TermParts& parts);
 
-  explicit BondRelease(const ReleaseParts& parts);
+  /// `parts` must outlive it. images: of a body that has some, which store nothing, so that one direction of a bond does not stand for both.
+  BondRelease(const TermParts& parts, bool images);
   ~BondRelease();
   /// How many bonds away from a point evaluation points matter to what its bonds set free.
   int reach() const noexcept { return parts_.formulation.bond && parts_.formulation.far_share > 0 && !mirrored_ ? 2 : 1; }
@@ -111,7 +101,9 @@ class BondRelease {
   void release_volume(Owner& owner, double pressure, double by_share, const Memory& m, double* S) const;
   const Owner& owner_of(std::int32_t p) const noexcept { return owners_[static_cast<std::size_t>(place_[static_cast<std::size_t>(p)])]; }
 
-  ReleaseParts parts_;
+  const TermParts& parts_;
+  ConstFieldView shift_;             ///< of point gradients (spaces/cloud_gradient.hpp); without data: none
+  std::span<const double> factors_;  ///< of the weights of evaluation points (EvaluationSpace::set_factors); empty: 1
   bool one_state_;  ///< both directions of a bond have the same gradient, law and stress
   bool mirrored_;   ///< and weights as their normalisers say
   bool through_point_gradient_;   ///< of the owner; else evaluation points have gradients of their own alone

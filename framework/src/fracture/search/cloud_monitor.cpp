@@ -7,6 +7,7 @@
 #include "families/cloud/cloud_families.hpp"
 #include "families/cloud/cloud_rows.hpp"
 #include "families/cloud/nearest_failure.hpp"
+#include "fracture/body_damage.hpp"
 #include "fracture/search/bond_monitor.hpp"
 #include "perikit/core/simd.hpp"
 
@@ -184,8 +185,8 @@ bool CloudMonitor::between(std::int64_t bond, std::int32_t p, double stretch, do
 
 }  // namespace
 
-std::unique_ptr<BondMonitor> CloudFamilies::make_monitor(const BodyDamage& damage, bool skip, const NearestFailure* known) const {
-  return std::make_unique<CloudMonitor>(*this, damage, skip, known);
+std::unique_ptr<BondFinder> make_cloud_monitor(const CloudFamilies& families, const BodyDamage& damage, bool skip, const NearestFailure* known) {
+  return std::make_unique<CloudMonitor>(families, damage, skip, known);
 }
 
 }  // namespace perikit

@@ -7,6 +7,7 @@
 #include "core/each_once.hpp"
 #include "families/lattice/lattice_families.hpp"
 #include "families/stretch.hpp"
+#include "fracture/body_damage.hpp"
 #include "fracture/search/bond_monitor.hpp"
 
 namespace perikit {
@@ -201,11 +202,11 @@ double LatticeMonitor<D>::check(const Group& group, ConstFieldView u, std::vecto
 
 }  // namespace
 
-std::unique_ptr<BondMonitor> LatticeFamilies::make_monitor(const BodyDamage& damage, bool skip, const NearestFailure*) const {
-  switch (grid.dimension) {
-    case 1: return std::make_unique<LatticeMonitor<1>>(*this, damage, skip);
-    case 2: return std::make_unique<LatticeMonitor<2>>(*this, damage, skip);
-    default: return std::make_unique<LatticeMonitor<3>>(*this, damage, skip);
+std::unique_ptr<BondFinder> make_lattice_monitor(const LatticeFamilies& families, const BodyDamage& damage, bool skip) {
+  switch (families.grid.dimension) {
+    case 1: return std::make_unique<LatticeMonitor<1>>(families, damage, skip);
+    case 2: return std::make_unique<LatticeMonitor<2>>(families, damage, skip);
+    default: return std::make_unique<LatticeMonitor<3>>(families, damage, skip);
   }
 }
 

@@ -15,7 +15,7 @@
 namespace perikit {
 
 class Families;
-class FractureRecord;
+class Fracture;
 
 /// What a snapshot of another run holds of its bonds and of the history of its laws: bonds that are not as they were at its set-up, and
 /// numbers of history.
@@ -25,8 +25,8 @@ struct Carried {
 
 class SavedState {
  public:
-  /// All of them must outlive this.
-  SavedState(const Points& points, Constraints& constraints, FractureRecord& fracture, Terms& terms, State& state)
+  /// All of them must outlive this. fracture: null where bonds never fail.
+  SavedState(const Points& points, Constraints& constraints, Fracture* fracture, Terms& terms, State& state)
       : points_(points), constraints_(constraints), fracture_(fracture), terms_(terms), state_(state) {}
 
   /// Of this rank alone. All ranks must call read_here, and everything below; what reads throws InputError for what belongs to another problem.
@@ -44,7 +44,7 @@ class SavedState {
  private:
   const Points& points_;
   Constraints& constraints_;
-  FractureRecord& fracture_;
+  Fracture* fracture_;
   Terms& terms_;
   State& state_;
 };

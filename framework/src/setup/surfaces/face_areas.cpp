@@ -66,7 +66,6 @@ Field face_areas(TermParts parts, int axis, UnitStress unit) {
   const Laws laws(body.space(), std::move(records), ids, body.stride());
   parts.laws = &laws;
   parts.stabilization = nullptr;  // a homogeneous deformation has no zero-energy part
-  parts.damage = nullptr;
   parts.interfaces = nullptr;  // one law on both sides
   parts.further.clear();       // they have no stress
   parts.skip = parts.share = true;

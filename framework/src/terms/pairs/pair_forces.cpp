@@ -123,15 +123,6 @@ void PairForces<D>::bonds_changed(std::span<const std::int32_t> points) {
 }
 
 template <int D>
-const NearestFailure* PairForces<D>::watch(const BodyDamage& damage) {
-  if (!damage.by_stretch()) return nullptr;
-  double least = std::numeric_limits<double>::max();
-  for (const std::int32_t p : body_.internal()) least = std::min(least, damage.onset.data()[p]);
-  for (const InterfaceDamage& i : damage.interfaces) least = std::min(least, i.least());
-  return loop_->watch(least);
-}
-
-template <int D>
 void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const {
   FamilyArrays& family = bonds.family;
   families_.load(p, BondsOf::intact, family);
@@ -210,7 +201,8 @@ void PairForces<D>::add_bonds(const Configuration& at, const Region& region, Bon
 }
 
 template <int D>
-std::int64_t PairForces<D>::dilatation(const Configuration& at, ConstFieldView w, const Region& region, GroupEnergy* energies, double* density) {
+std::int64_t PairForces<D>::dilatation(const Configuration& at, ConstFieldView w, const Region& region, GroupEnergy* energies, double* density,
+                                       double* by_theta) {
   // At the rim of `gradients` dilatations are not complete, and not the same on several ranks.
   const std::uint8_t *const only = region.near() ? region.near() : region.only(), *const local = region.near() ? region.only() : nullptr;
   PairPass pass{PairWork::dilatation, at.unfinished(), {}, {}, {}, theta_, nullptr, only, local != nullptr};
@@ -219,7 +211,6 @@ std::int64_t PairForces<D>::dilatation(const Configuration& at, ConstFieldView w
   const std::int64_t bad = loop_->run(pass);
   if (bad >= 0) return bad;
   const bool rates = w.data != nullptr;
-  if (screen_ && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
   if (rates) {
     if (rate_.size() == 0) rate_ = body_.make_field(1);
     loop_->run({PairWork::dilatation_rate, at.u(), w, {}, {}, rate_, nullptr, only, local != nullptr});
@@ -234,12 +225,12 @@ std::int64_t PairForces<D>::dilatation(const Configuration& at, ConstFieldView w
     const double* scale = scale_.data() + first;
     for (int l = 0; l < n; ++l) theta[l] = scale[l] * theta_.data()[first + static_cast<std::size_t>(l)];
     formulation_.dilatation->evaluate({n, theta, dilatation_modulus_.data() + first,
-                                       energies || density || screen_ ? phi : nullptr, pressure, rates ? stiffness : nullptr});
+                                       energies || density || by_theta ? phi : nullptr, pressure, rates ? stiffness : nullptr});
     for (int l = 0; l < n; ++l) {
       const std::size_t p = first + static_cast<std::size_t>(l);
       q_.data()[p] = scale[l] * pressure[l];
       if (rates) rate_.data()[p] *= scale[l] * scale[l] * stiffness[l];
-      if (screen_) by_theta_.data()[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
+      if (by_theta) by_theta[p] = theta[l] != 0 ? phi[l] / theta[l] * scale[l] : 0.0;
       if (density) density[p] = body_.alive(p) ? phi[l] : 0.0;
       if (energies && body_.alive(p) && (!local || marked(local, p))) energies[p / padding].stored += body_.volume(p) * phi[l];
     }
@@ -251,13 +242,14 @@ template <int D>
 std::int64_t PairForces<D>::forces(const Configuration& at, const Region& region, const ForceSum& sum) {
   GroupEnergy* const energies = sum.wants_stored() ? sum.energies.data() : nullptr;
   if (formulation_.dilatation) {
-    const std::int64_t bad = dilatation(at, {}, region, energies, nullptr);
+    if (sum.screen && by_theta_.size() == 0) by_theta_ = body_.make_field(1);
+    const std::int64_t bad = dilatation(at, {}, region, energies, nullptr, sum.screen ? by_theta_.data() : nullptr);
     if (bad >= 0) return bad;
   }
   PairPass pass{PairWork::force, at.unfinished(), {}, q_, {}, sum.force, energies, region.only(), !region.whole()};
   pass.arrival = at.arrival();
   if (!formulation_.dilatation) pass.motion = at.motion();   // else all have moved
-  pass.screen = region.whole() ? screen_ : nullptr;
+  pass.screen = sum.screen;
   if (pass.screen && formulation_.dilatation) pass.by_theta = by_theta_.data();
   return loop_->run(pass);
 }

@@ -40,8 +40,7 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   }
   void bonds_changed(std::span<const std::int32_t> points) override;
   void add_bonds(const Configuration& at, const Region& region, BondSamples& samples) override;
-  const NearestFailure* watch(const BodyDamage& damage) override;
-  void screen(BondScreen* screen) override { screen_ = screen; }
+  const NearestFailure* watch(double least_onset) override { return loop_->watch(least_onset); }
 
  private:
   /// The bonds of one point that are left.
@@ -60,8 +59,10 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   void renew_sides();
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m. The dilatations of a region are those of its `gradients`, the energies
-  /// those of `evaluated`. energies += V phi by group of eight points; phi by point -> density; null: not wanted.
-  std::int64_t dilatation(const Configuration& at, ConstFieldView w, const Region& region, GroupEnergy* energies, double* density);
+  /// those of `evaluated`. energies += V phi by group of eight points; phi by point -> density, phi/theta d/m ->
+  /// by_theta; null: not wanted.
+  std::int64_t dilatation(const Configuration& at, ConstFieldView w, const Region& region, GroupEnergy* energies, double* density,
+                           double* by_theta = nullptr);
 
   const Families& families_;
   const Body& body_;
@@ -76,7 +77,6 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   Field dilatation_modulus_;     ///< k_i
   Field theta_, q_, rate_;
   Field by_theta_;  ///< phi/theta d/m, where bonds are screened
-  BondScreen* screen_ = nullptr;
   Field density_;  ///< work field
   std::vector<const MaterialRecord*> warned_;
   std::vector<std::string> warnings_;

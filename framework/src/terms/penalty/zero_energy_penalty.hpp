@@ -15,7 +15,7 @@ namespace perikit {
 class ZeroEnergyPenalty : public Term, public AssembledTerm, public SampledTerm, public BreakableTerm {
  public:
   std::int64_t forces(const Configuration& at, const Region& region, const ForceSum& sum) final {
-    apply(at.u(), 1.0, sum.force, region, {sum.wants_stored() ? sum.energies.data() : nullptr, region.whole() ? screen_ : nullptr});
+    apply(at.u(), 1.0, sum.force, region, {sum.wants_stored() ? sum.energies.data() : nullptr, sum.screen});
     return -1;
   }
   std::int64_t tangent(const Configuration&, ConstFieldView w, const Region& region, FieldView Kw) final {
@@ -39,7 +39,6 @@ class ZeroEnergyPenalty : public Term, public AssembledTerm, public SampledTerm,
     return sample(at, samples);
   }
   void add_bonds(const Configuration& at, const Region& region, BondSamples& samples) final;
-  void screen(BondScreen* screen) final { screen_ = screen; }
 
  protected:
   explicit ZeroEnergyPenalty(const PenaltyParts& parts) : parts_(parts) {}
@@ -58,9 +57,6 @@ class ZeroEnergyPenalty : public Term, public AssembledTerm, public SampledTerm,
   virtual std::size_t bytes() const noexcept = 0;
 
   PenaltyParts parts_;
-
- private:
-  BondScreen* screen_ = nullptr;
 };
 
 /// Over the point gradient of a body.
