@@ -122,6 +122,7 @@ def beyond(everything):
     """Held faces, planes of symmetry and periodic sides, and pressures beside them; without `everything` other things that are rare, too."""
     if not everything:
         yield "silling, critical_energy, lattice", torn(KINEMATICS["silling"], DAMAGE["critical_energy"], False)
+        yield "silling, critical_energy, periodic, cloud", BEYOND["periodic"](torn(KINEMATICS["silling"], DAMAGE["critical_energy"], True))
         yield "baqp, order 2, max_stress, gradual, second law", torn(KINEMATICS["baqp, order 2"], DAMAGE["max_stress, gradual, second law"], False)
         yield "baqp, max_stress, cloud", torn(KINEMATICS["baqp"], DAMAGE["max_stress"], True)
         yield "silling, order 2, lattice", scene(KINEMATICS["silling, order 2"], 2)

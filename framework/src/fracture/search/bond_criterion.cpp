@@ -44,8 +44,9 @@ BondCriterion::BondCriterion(const Terms& terms, DamageTraits asked, const BodyD
   if (traits_.released) release_.emplace(terms.parts(), copies_ || std::ranges::any_of(body_.internal(), image));
   const std::size_t count = body_.stride() / padding;
   for (std::size_t g = 0; g < count; ++g) {
+    // Of the copies of a bond one rank decides, by whichever of their ends is near failure.
     bool any = false;
-    for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l) && (body_.owns(g * padding + l) || (copies_ && copies_->image(static_cast<std::int32_t>(g * padding + l))));
+    for (std::size_t l = 0; l < padding; ++l) any |= body_.alive(g * padding + l) && (copies_ || body_.owns(g * padding + l));
     if (any) groups_.push_back(static_cast<std::int32_t>(g));
   }
   own_.assign(count, 0);
@@ -89,7 +90,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
   if (by_point_) {
     const auto parts = static_cast<std::size_t>(formulation_.parts(body_.dimension()));
     const auto largest_factor = [&](std::size_t p) { return factors.empty() ? 1.0 : std::max(1.0, std::ranges::max(factors.subspan(p * parts, parts))); };
-    for (const std::int32_t p : body_.owned())
+    for (const std::int32_t p : copies_ ? body_.internal() : std::span(body_.owned()))   // another rank's points may speak for a bond that this one decides
       if (onset.data()[p] < infinite) screen_.density[static_cast<std::size_t>(p)] = own(p) / largest_factor(static_cast<std::size_t>(p));
     return;
   }
