@@ -59,7 +59,7 @@ ImageMaker::ImageMaker(int dimension, double reach, std::vector<ImagePlane> plan
     if (!across.empty()) across_.push_back(std::move(across));
   }
   // Periodic sides last, of images too: what is prescribed along a held face is asked for at places of the body, not beyond a periodic side.
-  std::ranges::stable_partition(across_, [&](const std::vector<std::size_t>& across) { return planes_[across.front()].period == 0; });
+  std::stable_partition(across_.begin(), across_.end(), [&](const std::vector<std::size_t>& across) { return planes_[across.front()].period == 0; });
 }
 
 ImageMaker::ImageMaker(const BodyFrame& frame, std::vector<ImagePlane> planes, std::span<const ImageSurface> surfaces)
