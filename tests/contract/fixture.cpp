@@ -183,6 +183,15 @@ void stretch_at_random(const Body& body, FieldView u, std::uint64_t seed) {
   }
 }
 
+void to_problem(const BodyProblem& problem, FieldView u) {
+  Field of_sources = problem.make_field();
+  for (int c = 0; c < u.components; ++c)
+    for (const std::int32_t p : problem.body().owned()) of_sources.component(c)[p] = u.component(c)[p];
+  problem.images()->extend(of_sources);
+  for (std::size_t n = problem.body().owned().size(); n < problem.body().points(); ++n)
+    for (int c = 0; c < u.components; ++c) u.component(c)[problem.body().internal()[n]] -= of_sources.component(c)[problem.body().internal()[n]];
+}
+
 Field force_of(BodyProblem& problem, ConstFieldView u, double* energy) {
   Field f = problem.make_field();
   f.fill(std::numeric_limits<double>::quiet_NaN());

@@ -94,6 +94,8 @@ void set_field(const Body& body, FieldView field, const std::function<Point(cons
 void deform(const Body& body, FieldView u, std::uint64_t seed, double noise);
 /// The same with every direction longer.
 void stretch_at_random(const Body& body, FieldView u, std::uint64_t seed);
+/// From displacements of all points, images too, to those of a problem with images.
+void to_problem(const BodyProblem& problem, FieldView u);
 /// Forces at u, over memory full of NaN: whatever a kernel forgets to write shows. The energy -> *energy where wanted.
 /// Throws where u is inadmissible.
 Field force_of(BodyProblem& problem, ConstFieldView u, double* energy = nullptr);

@@ -66,16 +66,6 @@ std::vector<Case> cases_with_images() {
   return all;
 }
 
-/// From displacements of all points, images too, to those of the problem.
-void to_problem(const BodyProblem& problem, FieldView u) {
-  Field of_sources = problem.make_field();
-  for (int c = 0; c < u.components; ++c)
-    for (const std::int32_t p : problem.body().owned()) of_sources.component(c)[p] = u.component(c)[p];
-  problem.images()->extend(of_sources);
-  for (std::size_t n = problem.body().owned().size(); n < problem.body().points(); ++n)
-    for (int c = 0; c < u.components; ++c) u.component(c)[problem.body().internal()[n]] -= of_sources.component(c)[problem.body().internal()[n]];
-}
-
 }  // namespace
 
 TEST_CASE("kinematics: between faces force = -dE/du and reaction = dE/dU, the tangent is their derivative, symmetric, and the assembled one") {
@@ -257,5 +247,14 @@ TEST_CASE("kinematics: half a lattice and its image are the whole") {
         for (int a = 0; a < d; ++a) worst = std::max(worst, std::abs(f.component(a)[p] - g.component(a)[q]));
       }
       CHECK_MESSAGE(worst <= 1e-12 * largest(of_whole.body(), g), "forces differ by ", worst / largest(of_whole.body(), g));
+      PointSamples of_points{.asked = Sampling::energy}, of_whole_points{.asked = Sampling::energy};
+      REQUIRE((of_half.sample(of_points).ok() && of_whole.sample(of_whole_points).ok()));
+      double off = 0, most = 0;
+      for (const std::int32_t p : of_half.body().owned()) {
+        const double density = of_whole_points.strain_energy_density.data()[at.at(cell(of_half.body().position(static_cast<std::size_t>(p))))];
+        off = std::max(off, std::abs(of_points.strain_energy_density.data()[p] - density));
+        most = std::max(most, density);
+      }
+      CHECK_MESSAGE(off <= 1e-12 * most, "energy densities differ by ", off / most, " of the largest");
     }
 }

@@ -34,7 +34,7 @@ std::uint16_t far_material(const Scene& scene, bool images) { return static_cast
 
 /// What lies beyond held faces, planes of symmetry and periodic sides.
 struct Beyond {
-  Images images;  ///< of several ranks: what this one has of them
+  std::shared_ptr<const Images> images = std::make_shared<const Images>();  ///< of several ranks: what this one has of them
   std::vector<FaceMotion> motions;
   std::vector<std::string> notes;  ///< where sides were found to lie
   std::shared_ptr<const Interfaces> interfaces;   ///< null: no laminates
@@ -43,9 +43,9 @@ struct Beyond {
 Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
   ScenePlanes planes = build_planes(scene, placed_points(body), quasi_static);
   if (planes.planes.empty() && planes.surfaces.empty()) return {};
-  Images images = make_images(body, planes.planes, planes.surfaces);
+  auto images = std::make_shared<const Images>(make_images(body, planes.planes, planes.surfaces));
   try {
-    body = Body(body, images, image_material(scene));
+    body = Body(body, *images, image_material(scene));
   } catch (const OverlappingImage& error) {
     refuse_overlap(planes, error);
   }
@@ -56,7 +56,7 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
 Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
   return {.bonds = formulation.bond && formulation.far_share > 0 ? 3 : 2,
           .blocks = formulation.weighted != nullptr || (formulation.point && formulation.order > 1),
-          .sources = formulation.pairs && !scene.regions.empty()};  // bonds across interfaces know the moduli of both sides
+          .sources = formulation.pairs != nullptr};  // samples of bonds to images ask for the moduli of both ends
 }
 
 /// The body of this rank, which no rank has as a whole.
@@ -67,13 +67,13 @@ Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulat
     parts.partition = std::move(local.partition);
     Beyond beyond;
     if (local.images) {
-      beyond.images = std::move(*local.images);
+      beyond.images = std::make_shared<const Images>(std::move(*local.images));
       beyond.motions = std::move(local.motions);
       beyond.notes = std::move(local.notes);
-      parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
+      parts.images = std::make_unique<const ImageMap>(*parts.body, *beyond.images);
     }
     beyond.interfaces = std::make_shared<const Interfaces>(
-        build_interfaces(scene, factory, formulation, *parts.body, std::move(local.material), beyond.images.source));
+        build_interfaces(scene, factory, formulation, *parts.body, std::move(local.material), beyond.images->source));
     return beyond;
   } catch (const std::domain_error& error) {
     throw InputError(scene.body.position, "body", error.what());
@@ -87,9 +87,9 @@ Beyond place_points(const Scene& scene, const PartFactory& factory, const Formul
   std::vector<std::uint16_t> material = materials_of_points(body);
   Beyond beyond = place_images(scene, body, quasi_static);
   beyond.interfaces =
-      std::make_shared<const Interfaces>(build_interfaces(scene, factory, formulation, body, std::move(material), beyond.images.source));
+      std::make_shared<const Interfaces>(build_interfaces(scene, factory, formulation, body, std::move(material), beyond.images->source));
   parts.body = std::make_unique<const Body>(std::move(body));
-  if (beyond.images.size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, beyond.images);
+  if (beyond.images->size() > 0) parts.images = std::make_unique<const ImageMap>(*parts.body, *beyond.images);
   return beyond;
 }
 
@@ -230,8 +230,9 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;
+  if (parts.images) of_terms.images = beyond.images;
   if (scene.damage) steps.begin("limits of bonds");
-  std::unique_ptr<const BodyDamage> damage = build_damage(scene, factory, of_terms, parts.images.get(), beyond.images, partition, quasi_static, warnings);
+  std::unique_ptr<const BodyDamage> damage = build_damage(scene, factory, of_terms, parts.images.get(), *beyond.images, partition, quasi_static, warnings);
   steps.begin("weights");
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
@@ -247,7 +248,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.materials.resize(parts.laws->records().size(), scene.material->type);
 
   steps.begin("boundaries and loads");
-  Constraints constraints = build_constraints(scene, body, beyond.images, std::move(beyond.motions), quasi_static);
+  Constraints constraints = build_constraints(scene, body, *beyond.images, std::move(beyond.motions), quasi_static);
   State state(body);
   set_initial_state(scene, body, constraints, quasi_static, state);
   parts.notes = std::move(beyond.notes);

@@ -19,6 +19,7 @@ namespace perikit {
 
 class Body;
 struct CloudConsistency;
+struct Images;
 struct Interfaces;
 
 struct TermParts;
@@ -34,6 +35,7 @@ struct TermParts {
   bool skip = true;                                    ///< leave out work whose result is known; changes no bit
   bool share = true;                                   ///< savings by symmetry and uniformity; change rounding
   std::shared_ptr<const Interfaces> interfaces;        ///< where materials meet as laminates; null: nowhere
+  std::shared_ptr<const Images> images;                ///< of points of the body; null: none
   std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
   std::vector<TermMaker> further;                      ///< what acts beside the formulation
 };

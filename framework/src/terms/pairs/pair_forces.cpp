@@ -38,6 +38,12 @@ PairForces<D>::PairForces(const PairParts& parts)
   }
   if (formulation_.pair_traits.surface_correction) fields_.correction = surface_correction<D>(families_, law_, laws_);
   if (interfaces_) set_sides();
+  if (parts.images) {
+    const auto internal = body_.internal();
+    const std::size_t real = internal.size() - parts.images->size();
+    for (std::size_t k = 0; k < parts.images->size(); ++k)
+      images_.push_back({internal[real + k], internal[static_cast<std::size_t>(parts.images->source[k])]});
+  }
 }
 
 template <int D>
@@ -74,6 +80,14 @@ void PairForces<D>::renew_sides() {
   double* const stiffness = fields_.sides.component(PairFields::stiffness);
   for (const Interface& interface : interfaces_->all)
     for (const std::int32_t p : interface.point) stiffness[p] = fields_.modulus.data()[interfaces_->source[static_cast<std::size_t>(p)]];
+}
+
+template <int D>
+void PairForces<D>::show_bonds_to_images(bool whole) {
+  for (const auto& [image, source] : images_) {
+    fields_.modulus.data()[image] = whole ? fields_.modulus.data()[source] : 0.0;
+    if (interfaces_) fields_.sides.component(PairFields::stores)[image] = whole ? 1.0 : 0.0;
+  }
 }
 
 template <int D>
@@ -275,11 +289,13 @@ std::int64_t PairForces<D>::sample(const Configuration& at, PointSamples& sample
     const std::int64_t bad = dilatation(at, {}, {}, nullptr, volumetric.data());
     if (bad >= 0) return bad;
   }
+  show_bonds_to_images(true);
   if (any_of(samples.asked, Sampling::virial)) {
     samples.P = body_.make_field(D * D);
     add_virial(at.u(), samples.P);
   }
   const std::int64_t bad = loop_->run({PairWork::energy, at.u(), {}, q_, {}, bonds, nullptr});
+  show_bonds_to_images(false);
   for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
   return bad;
 }

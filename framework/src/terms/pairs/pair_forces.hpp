@@ -1,7 +1,9 @@
 #pragma once
+#include <array>
 #include <vector>
 
 #include "body/interfaces.hpp"
+#include "perikit/body/images.hpp"
 #include "terms/pairs/pair_loop.hpp"
 #include "terms/term.hpp"
 
@@ -14,6 +16,7 @@ struct PairParts {
   const Laws& laws;
   bool skip = true, share = true;
   std::shared_ptr<const Interfaces> interfaces;   ///< across these bonds are springs in series; null: nowhere
+  std::shared_ptr<const Images> images;           ///< of points of the body; null: none
 };
 
 /// Any pair law on any body: one loop over bonds, or two where the law has a dilatation.
@@ -57,6 +60,10 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   void warn(const PairPoint& point, const MaterialRecord& record);
   void set_sides();
   void renew_sides();
+  /// Images store nothing, so that a bond to one has half of its modulus: its copy, from the image of this end to the source of the far one, has the
+  /// rest. The two together store the energy of one bond. Point by point each is a whole bond of which either end has one half, as in a body that
+  /// goes on beyond its side. whole: bonds are such from now on; else they are as forces want them again.
+  void show_bonds_to_images(bool whole);
   PairPoint point(std::size_t p) const;
   /// Dilatation of u -> theta_, q_ = phi' d/m; along w -> rate_ = phi'' dtheta d/m. The dilatations of a region are those of its `gradients`, the energies
   /// those of `evaluated`. energies += V phi by group of eight points; phi by point -> density, phi/theta d/m ->
@@ -68,6 +75,7 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   const Body& body_;
   const Laws& laws_;
   std::shared_ptr<const Interfaces> interfaces_;
+  std::vector<std::array<std::int32_t, 2>> images_;   ///< internal indices of images and their sources
   const Formulation& formulation_;
   const PairKinematics& law_;
   bool share_;
