@@ -178,8 +178,8 @@ const Fault faults[]{
     {"body.lattice", "jitter", "0.1", SURFACE("x - 6.2") "[[symmetry]]\naxis = \"x\"\nat = 6.2\n", 1002, "boundary.1.surface",
      "found a surface that symmetry.0.axis has too", "one of the two"},
     {"body.lattice", "jitter", "0.1", SURFACE("-0.3 - x"), 24, "boundary.0", "held in x, and its face by another", "one of them"},
-    {"kinematics", "type", "\"bond_based\"", "[[output.history]]\nname = \"s\"\nquantity = \"cauchy\"\ncomponent = \"xx\"\n",
-     1003, "output.history.0.quantity", "found \"cauchy\"", "displacement"},
+    {"kinematics", "type", "\"bond_based\"", "[[output.history]]\nname = \"s\"\nquantity = \"shape_tensor_condition\"\n",
+     1003, "output.history.0.quantity", "found \"shape_tensor_condition\"", "displacement"},
 };
 
 struct Bench {

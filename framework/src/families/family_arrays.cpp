@@ -4,6 +4,7 @@
 
 #include "core/dimension.hpp"
 #include "families/reproducing_kernel.hpp"
+#include "families/shape_tensor.hpp"
 #include "families/stencils.hpp"
 
 namespace perikit {
@@ -33,6 +34,15 @@ FamilyView FamilyArrays::view(double horizon) const noexcept {
           omega.data(),
           inverse_shape,
           0};
+}
+
+void find_inverse_shape(FamilyArrays& family) {
+  const int d = family.dimension;
+  double K[6] = {};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(family.bonds); ++k)
+    for (int a = 0; a < d; ++a)
+      for (int e = a; e < d; ++e) K[symmetric_index(d, a, e)] += family.omega[k] * family.volume[k] * family.xi[a][k] * family.xi[e][k];
+  invert_shape(d, K, family.inverse_shape);
 }
 
 int point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {

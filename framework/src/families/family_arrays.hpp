@@ -25,6 +25,9 @@ struct FamilyArrays {
   double b(std::size_t k) const noexcept { return integrity.empty() ? 1.0 : integrity[k]; }
 };
 
+/// K^-1 of the bonds of a family whose Families have no shape tensors; 0 where they span no volume.
+void find_inverse_shape(FamilyArrays& family);
+
 /// Point gradient of order n: Hbar = sum_k u_k (x) g_k over the bonds, u_k relative to the owner; g[k * d + e]. Order 1:
 /// g_k = b omega V_k K^-1 xi_k, 0 where K is singular. The order that the family supports is returned, 0 for no gradient at all.
 int point_gradient(const FamilyArrays& family, double horizon, int order, std::vector<double>& g);

@@ -22,7 +22,7 @@ struct OutputField {
 struct PointField {
   std::string name;
   int width;                                          ///< numbers per point: 1, 3 (vector) or 9 (tensor)
-  bool of_gradients;                                  ///< made of deformation gradients, which pair laws do not have
+  bool of_shapes;                                     ///< made of shape tensors, which pair laws do not have
   Sampling samples;                                   ///< what is sampled for it
   std::string label, unit;                            ///< as pictures show them
   std::vector<double> (*compute)(PointFields& from);  ///< width * points

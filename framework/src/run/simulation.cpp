@@ -31,7 +31,7 @@ Simulation::Simulation(const Scene& scene, const PartFactory& factory, WorkSteps
         fmt::format("found with integrator \"{}\", which knows no velocities; allowed: with integrators of dynamic runs",
                     scene_.integrator->type));
   }
-  if (!problem_->terms().has_gradients()) refuse_gradients();
+  if (!problem_->terms().has_gradients()) refuse_shapes();
   small_strains_ = std::make_unique<SmallStrains>(scene_, factory, *problem_);
   carried_ = carry_from_earlier_run(scene_, *problem_);
   evaluate_conditions();
@@ -79,13 +79,13 @@ void Simulation::evaluate_conditions() {
   }
 }
 
-void Simulation::refuse_gradients() const {
+void Simulation::refuse_shapes() const {
   const auto check = [&](const std::string& field, const SourcePosition& position, const std::string& key) {
-    if (!find_point_field(field)->of_gradients) return;
+    if (!find_point_field(field)->of_shapes) return;
     std::vector<std::string> others;
     for (const PointField& other : point_fields())
-      if (!other.of_gradients) others.push_back(other.name);
-    throw InputError(position, key, fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without deformation gradients and stresses; allowed: {}",
+      if (!other.of_shapes) others.push_back(other.name);
+    throw InputError(position, key, fmt::format("found \"{}\", but kinematics \"{}\" is a pair law without shape tensors; allowed: {}",
                                                 field, scene_.kinematics->type, fmt::join(others, ", ")));
   };
   for (const std::string& field : scene_.output.fields) check(field, scene_.output.fields_position, "output.fields");

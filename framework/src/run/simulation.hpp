@@ -51,7 +51,7 @@ class Simulation {
 
  private:
   /// InputError where output asks a pair law for fields that it does not have.
-  void refuse_gradients() const;
+  void refuse_shapes() const;
   /// InputError where a load, a boundary or the exact values of a history column have no finite value at the start or the end.
   void evaluate_conditions();
   /// InputError where nothing holds a piece of a body whose equilibrium is looked for.

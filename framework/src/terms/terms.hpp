@@ -84,7 +84,7 @@ class Terms {
   /// sum += energies of the groups of eight points of the body that this rank owns.
   void add_owned(std::span<const GroupEnergy> energies, double GroupEnergy::* which, ExactSum& sum) const;
 
-  /// Whether samples hold H and stresses; pair laws have none (their fields stay empty), only an energy density.
+  /// Whether forces come from deformation gradients. Pair laws have none: H and stresses of their samples are made of the bonds of a point.
   bool has_gradients() const noexcept { return parts_.formulation.pairs == nullptr; }
   /// Whether the body is springs between points and nothing else, which have one modulus: Poisson's ratio is theirs.
   bool springs_alone() const noexcept { return parts_.formulation.pairs && !parts_.formulation.dilatation; }

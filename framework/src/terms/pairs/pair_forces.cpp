@@ -160,23 +160,92 @@ void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) co
 }
 
 template <int D>
-void PairForces<D>::add_virial(ConstFieldView u, FieldView P) const {
-  parallel_for(body_.stride() / padding, [&](std::size_t g) {
+double PairForces<D>::poisson(std::size_t p) const noexcept {
+  if (D == 1 || formulation_.dilatation) return laws_.moduli(p).poisson();
+  return laws_.space() == Space::plane_stress ? 1.0 / 3 : 1.0 / 4;
+}
+
+namespace {
+
+/// F - I, row by row in the space of the body, over the bonds that are left; zero where they span no volume.
+template <int D>
+std::array<double, D * D> family_gradient(FamilyArrays& family, double horizon, std::size_t p, ConstFieldView u, std::vector<double>& g) {
+  find_inverse_shape(family);
+  point_gradient(family, horizon, 1, g);
+  std::array<double, D * D> H{};
+  for (std::size_t k = 0; k < family.far.size(); ++k)
+    for (std::size_t a = 0; a < D; ++a) {
+      const double* const of = u.component(static_cast<int>(a));
+      for (std::size_t e = 0; e < D; ++e) H[a * D + e] += (of[family.far[k]] - of[p]) * g[k * D + e];
+    }
+  return H;
+}
+
+template <int D>
+double determinant(std::array<double, D * D> H) {
+  for (std::size_t a = 0; a < D; ++a) H[a * D + a] += 1;
+  if constexpr (D == 1) return H[0];
+  else if constexpr (D == 2) return H[0] * H[3] - H[1] * H[2];
+  else return H[0] * (H[4] * H[8] - H[5] * H[7]) - H[1] * (H[3] * H[8] - H[5] * H[6]) + H[2] * (H[3] * H[7] - H[4] * H[6]);
+}
+
+}  // namespace
+
+template <int D>
+void PairForces<D>::add_tensors(ConstFieldView u, PointSamples& samples) const {
+  const auto field = [&](Sampling of, int components) { return any_of(samples.asked, of) ? body_.make_field(components) : Field(); };
+  samples.H = field(Sampling::H, laws_.components());
+  samples.P = field(Sampling::P, laws_.components());
+  samples.cauchy = field(Sampling::cauchy, 9);
+  samples.von_mises = field(Sampling::von_mises, 1);
+  const bool gradients = any_of(samples.asked, Sampling::H | Sampling::cauchy | Sampling::von_mises);
+  const bool stresses = any_of(samples.asked, Sampling::P | Sampling::cauchy | Sampling::von_mises);
+  if (!gradients && !stresses) return;
+  const bool stress_space = laws_.space() == Space::plane_stress || laws_.space() == Space::line_stress;
+  parallel_for(body_.stride() / padding, [&](std::size_t group) {
     Bonds bonds;
-    for (std::size_t p = g * padding; p < (g + 1) * padding; ++p) {
-      if (!body_.alive(p)) continue;
-      load_bonds(p, u, bonds);
-      const FamilyArrays& family = bonds.family;
-      const double q = formulation_.dilatation ? q_.data()[p] : 0.0;
-      for (std::size_t k = 0; k < family.far.size(); ++k) {
+    std::vector<double> g;
+    for (std::size_t p = group * padding; p < (group + 1) * padding; ++p) {
+      if (!body_.alive(p) || laws_.record_of(p).silent) continue;
+      if (stresses) load_bonds(p, u, bonds);
+      else families_.load(p, BondsOf::intact, bonds.family);
+      FamilyArrays& family = bonds.family;
+      const double nu = D < 3 ? poisson(p) : 0.0, q = formulation_.dilatation ? q_.data()[p] : 0.0;
+      double J = 1, across = 1;   // F across the body
+      if (gradients) {
+        const std::array<double, D * D> H = family_gradient<D>(family, body_.horizon(), p, u, g);
+        const double in_space = determinant<D>(H);
+        if (in_space > 0) {
+          if (stress_space) across = std::pow(in_space, D == 1 ? -nu : -nu / (1 - nu));
+          J = in_space * std::pow(across, 3 - D);
+        }
+        for (int c = 0; c < samples.H.components(); ++c) samples.H.component(c)[p] = c < D * D ? H[static_cast<std::size_t>(c)] : across - 1;
+      }
+      double P[D][D] = {}, tau[3][3] = {};   // tau = J sigma
+      for (std::size_t k = 0; k < family.far.size() && stresses; ++k) {
         const auto far = static_cast<std::size_t>(family.far[k]);
         const double T = 0.5 * bonds.force[k] + bonds.omega[k] * family.length[k] * fields_.own_strain(p, far) * q,
                      factor = family.b(k) * family.volume[k] * T / (family.length[k] + bonds.extension[k]);
-        for (int a = 0; a < D; ++a) {
-          const double y = family.xi[a][k] + u.component(a)[far] - u.component(a)[p];
-          for (int e = 0; e < D; ++e) P.component(a * D + e)[p] += factor * y * family.xi[e][k];
-        }
+        double y[D];
+        for (int a = 0; a < D; ++a) y[a] = family.xi[a][k] + u.component(a)[far] - u.component(a)[p];
+        for (int a = 0; a < D; ++a)
+          for (int e = 0; e < D; ++e) {
+            P[a][e] += factor * y[a] * family.xi[e][k];
+            if (e >= a) tau[a][e] += factor * y[a] * y[e];
+          }
       }
+      double trace = 0;
+      for (int a = 0; a < D; ++a) {
+        trace += tau[a][a];
+        for (int e = 0; e < a; ++e) tau[a][e] = tau[e][a];
+      }
+      for (int a = D; a < 3 && !stress_space; ++a) tau[a][a] = (D == 1 ? nu / (1 - nu) : nu) * trace;
+      for (int c = 0; c < samples.P.components(); ++c) samples.P.component(c)[p] = c < D * D ? P[c / D][c % D] : tau[2][2];
+      for (int c = 0; c < samples.cauchy.components(); ++c) samples.cauchy.component(c)[p] = tau[c / 3][c % 3] / J;
+      if (samples.von_mises.size() == 0) continue;
+      const double dx = tau[0][0] - tau[1][1], dy = tau[1][1] - tau[2][2], dz = tau[2][2] - tau[0][0],
+                   off = tau[0][1] * tau[0][1] + tau[1][2] * tau[1][2] + tau[0][2] * tau[0][2];
+      samples.von_mises.data()[p] = std::sqrt(0.5 * (dx * dx + dy * dy + dz * dz) + 3 * off) / J;
     }
   });
 }
@@ -290,10 +359,7 @@ std::int64_t PairForces<D>::sample(const Configuration& at, PointSamples& sample
     if (bad >= 0) return bad;
   }
   show_bonds_to_images(true);
-  if (any_of(samples.asked, Sampling::virial)) {
-    samples.P = body_.make_field(D * D);
-    add_virial(at.u(), samples.P);
-  }
+  add_tensors(at.u(), samples);
   const std::int64_t bad = loop_->run({PairWork::energy, at.u(), {}, q_, {}, bonds, nullptr});
   show_bonds_to_images(false);
   for (std::size_t p = 0; p < body_.stride(); ++p) samples.strain_energy_density.data()[p] += bonds.data()[p] + volumetric.data()[p];
@@ -309,7 +375,7 @@ void PairForces<D>::report(ModelReport& report) const {
        {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_, &by_theta_})
     report.bytes += field->bytes();
   report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
-  report.skips.push_back({"deformation gradients and stresses", "pair law", "shape tensors, one material evaluation a point or bond"});
+  report.skips.push_back({"deformation gradients and stresses in forces", "pair law", "shape tensors, one material evaluation a point or bond"});
   if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));
   if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
 }

@@ -35,7 +35,6 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
 
   int coupling_reach() const noexcept override { return formulation_.dilatation ? 2 : 1; }
   std::unique_ptr<Assembly> make_assembly(const BlockRows& rows) override;
-  /// strain_energy_density, and P where it is asked for.
   std::int64_t sample(const Configuration& at, PointSamples& samples) override;
   std::int64_t forces_and_samples(const Configuration& at, const ForceSum& sum, PointSamples& samples) override {
     const std::int64_t bad = forces(at, {}, sum);
@@ -53,8 +52,15 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
     AlignedVector<double> energy, force;
   };
   void load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const;
-  /// P_i = sum_j b V_j (w'/2 + omega |xi| q_i) n (x) xi: the derivative of the energy density of a point by a homogeneous deformation.
-  void add_virial(ConstFieldView u, FieldView P) const;
+  /// Poisson's ratio that the law has at a point: of springs alone the one that springs have, else that of the material.
+  double poisson(std::size_t p) const noexcept;
+  /// What is asked for of
+  ///   P_i = sum_j b V_j t_ij (x) xi,  t_ij = (w'/2 + omega |xi| q_i) n: the derivative of the energy density of a point by a homogeneous deformation,
+  ///   F_i: the least-squares gradient over the bonds that are left, I where they span no volume,
+  ///   sigma_i = sum_j b V_j t_ij (x) y/J, y the deformed bond and J = det F_i: P F^T/J where the deformation is homogeneous, and symmetric everywhere.
+  /// In strain spaces stresses across the body follow from Poisson's ratio; in stress spaces F across it does, with logarithmic strains. J is 1 where
+  /// det F_i is not positive. Points that store nothing have none.
+  void add_tensors(ConstFieldView u, PointSamples& samples) const;
   /// Moduli of points with the same family, loaded without cuts.
   void set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus);
   void warn(const PairPoint& point, const MaterialRecord& record);
