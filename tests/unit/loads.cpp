@@ -179,6 +179,23 @@ TEST_CASE("pressure that varies: force and moment of a hydrostatic wall, and of 
     }
 }
 
+TEST_CASE("pressure that varies, on a body without free faces across an axis") {
+  for (const char* kinematics : with_faces) {
+    INFO(kinematics);
+    const auto simulation = plate("x > -1", 0.0, "pressure = \"7 + x\"", kinematics, "[[periodic]]\naxis = \"y\"\n");
+    BodyProblem& problem = simulation->problem();
+    problem.loads().evaluate(0.0, problem.state().external_force());
+    double forces[2]{}, largest = 0;
+    for (const std::int32_t p : problem.body().owned())
+      for (int c = 0; c < 2; ++c) {
+        forces[c] += problem.state().external_force().component(c)[p];
+        if (c == 1) largest = std::max(largest, std::abs(problem.state().external_force().component(c)[p]));
+      }
+    CHECK(forces[0] == doctest::Approx(-(13 - 7) * 5.0 * 2).epsilon(1e-11));
+    CHECK(largest <= 1e-11);
+  }
+}
+
 TEST_CASE("tractions and pressures on a part of the surface of a lattice: force and first moments are those of its cell faces") {
   // Three spacings from an edge, where shares of kinematics are unlike cells; faces 0 < y < 5 at x = 6, 0 < x < 6 at y = 5, thickness 2.
     for (const char* kinematics : with_faces) {

@@ -36,7 +36,7 @@ SurfaceRule::SurfaceRule(const Body& body, std::vector<std::int32_t> points, std
     for (std::size_t a = 0; a < 3; ++a) middle[a + 1].add(weight * at(k)[a]);
   }
   const double total = total_of(body, middle[0]);
-  for (std::size_t a = 0; a < 3; ++a) origin_[a] = total_of(body, middle[a + 1]) / total;
+  for (std::size_t a = 0; a < 3; ++a) origin_[a] = total > 0 ? total_of(body, middle[a + 1]) / total : 0.0;
 
   std::array<std::array<ExactSum, size>, size> gram;
   std::array<ExactSum, size> lack;
@@ -114,6 +114,7 @@ std::vector<double> SurfaceRule::forces(const SpaceTimeFunction& value, double t
     const Moments phi = basis(body_->position(static_cast<std::size_t>(points_[k])));
     for (std::size_t i = 0; i < size; ++i) lack[i].add(-forces[k] * phi[i]);
   }
+  if (!(area_ > 0)) return forces;   // no face across this axis: nothing to compare with
   Moments c;
   const double uniform = total_of(*body_, mean) / area_;
   for (std::size_t i = 0; i < size; ++i) c[i] = total_of(*body_, lack[i]) - uniform * uniform_[i];
