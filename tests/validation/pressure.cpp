@@ -144,6 +144,125 @@ TEST_CASE("a pressure all around holds a uniform one in equilibrium under select
     }
 }
 
+namespace {
+
+/// A uniform expansion of a body with a pair law under a pressure on all of its surface.
+struct Expansion {
+  double left;       ///< largest sum of internal and external forces on a point over the largest external one, under the pressure that fits best
+  double pressure;   ///< that pressure, minus it
+  double stress;     ///< of the point that is farthest from the surface
+  double total;      ///< largest component of the sum of the external forces over the sum of their sizes
+};
+
+Expansion expansion(Simulation& simulation, double stretch, const Point& middle) {
+  BodyProblem& problem = simulation.problem();
+  const Body& body = problem.body();
+  const int d = problem.dimension();
+  Field force = problem.make_field(), external = problem.make_field();
+  const FieldView u = problem.state().displacement();
+  for (const std::int32_t p : body.internal())
+    for (int c = 0; c < d; ++c) u.component(c)[p] = (stretch - 1) * body.position(static_cast<std::size_t>(p))[static_cast<std::size_t>(c)];
+  if (problem.images()) contract::to_problem(problem, u);
+  REQUIRE(problem.evaluate_forces({u, 0}, force, nullptr).ok());
+  REQUIRE(problem.external_forces({u, 1.0}, external).ok());
+  Expansion found{};
+  double both = 0, square = 0, sizes = 0;
+  std::array<double, 3> sum{};
+  for (const std::int32_t p : body.owned())
+    for (int c = 0; c < d; ++c) {
+      const double f = external.component(c)[p];
+      both += force.component(c)[p] * f;
+      square += f * f;
+      sum[static_cast<std::size_t>(c)] += f;
+      sizes += std::abs(f);
+    }
+  found.pressure = -both / square;
+  double largest = 0;
+  for (const std::int32_t p : body.owned())
+    for (int c = 0; c < d; ++c) {
+      const double f = found.pressure * external.component(c)[p];
+      largest = std::max(largest, std::abs(f));
+      found.left = std::max(found.left, std::abs(force.component(c)[p] + f));
+    }
+  found.left /= largest;
+  for (int c = 0; c < d; ++c) found.total = std::max(found.total, std::abs(sum[static_cast<std::size_t>(c)]) / sizes);
+  PointSamples samples;
+  REQUIRE(problem.sample(samples).ok());
+  const auto away = [&](std::int32_t p) {
+    double square_of = 0;
+    for (std::size_t c = 0; c < static_cast<std::size_t>(d); ++c) square_of += std::pow(body.position(static_cast<std::size_t>(p))[c] - middle[c], 2);
+    return square_of;
+  };
+  found.stress = samples.P.component(0)[*std::ranges::min_element(body.owned(), {}, away)];
+  return found;
+}
+
+std::string pair_scene(const std::string& body, const std::string& law, const std::string& more) {
+  return fmt::format("format = 1\n[body]\n{}[sets]\nright = \"x > 1.1\"\n[family]\nhorizon_ratio = 2.015\n[kinematics]\n{}\n[material]\ntype = \"linear_elastic\"\ndensity = 1000.0\n"
+                     "youngs_modulus = 3.0e6\npoisson_ratio = 0.3\n{}[integrator]\ntype = \"evaluate\"\n",
+                     body, law, more);
+}
+
+constexpr const char* pair_laws[] = {"type = \"bond_based\"", "type = \"bond_based\"\nsurface_correction = \"energy\"", "type = \"ordinary\"",
+                                     "type = \"ordinary\"\nsurface_correction = \"energy\""};
+
+}  // namespace
+
+TEST_CASE("pair laws: a pressure all around holds a uniform expansion in equilibrium, point by point, dead and following, on lattices and clouds") {
+  const std::string line = "dimension = 1\nline = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [0]\nupper = [2]\n",
+                    sheet = "dimension = 2\nplane = \"strain\"\nthickness = 0.5\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1.4, 1.2]\n",
+                    cube = "dimension = 3\n[body.lattice]\nspacing = 0.1\nlower = [0, 0, 0]\nupper = [1.2, 1.1, 1.0]\n",
+                    hole = "dimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [2.2, 2.2]\ninside = \"(x - 0.5)^2 + (y - 0.4)^2 > 0.05\"\n";
+  struct PairCase {
+    std::string body;
+    Point middle;
+  };
+  for (const PairCase& c : {PairCase{line, {1, 0, 0}}, PairCase{sheet, {0.7, 0.6, 0}}, PairCase{cube, {0.6, 0.55, 0.5}}, PairCase{hole, {1.4, 1.4, 0}}})
+    for (const char* law : pair_laws)
+      for (const bool cloud : {false, true})
+        for (const bool follower : {false, true}) {
+          INFO(std::string(law), " ", c.body, std::string(cloud ? "jitter" : ""), " follower ", follower);
+          const double stretch = 1.1;
+          const auto simulation = build(pair_scene(c.body + (cloud ? "jitter = 0.2\n" : ""), law, fmt::format("[[load]]\nset = \"all\"\npressure = 1.0\nfollower = {}\n", follower)));
+          const int d = simulation->problem().dimension();
+          const Expansion found = expansion(*simulation, stretch, c.middle);
+          CHECK_MESSAGE(found.left <= 1e-11, "out of balance by ", found.left);
+          CHECK_MESSAGE(found.total <= 1e-13, "the forces sum to ", found.total, " of their sizes");
+          const double wanted = follower ? found.stress / std::pow(stretch, d - 1) : found.stress;
+          // On a cloud one point has another stress than the median of those inside.
+          CHECK_MESSAGE(std::abs(found.pressure + wanted) <= (cloud ? 0.4 : 1e-11) * std::abs(wanted), "the pressure is ", found.pressure, " for ", -wanted);
+        }
+}
+
+TEST_CASE("pair laws: a pressure that follows holds a uniform expansion in equilibrium beside held faces and planes of symmetry, and its stiffness is its derivative") {
+  const std::string sheet = "dimension = 2\nplane = \"strain\"\nthickness = 0.5\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1.4, 1.2]\n",
+                    held = "[[boundary]]\nface = \"-x\"\ndisplacement = [\"0.1*x\", \"0.1*y\"]\n", symmetry = "[[symmetry]]\naxis = \"y\"\n",
+                    load = "[[load]]\nset = \"all\"\npressure = 1.0\nfollower = true\n";
+  for (const char* law : pair_laws)
+    for (const bool cloud : {false, true})
+      for (const std::string& sides : {held, symmetry, held + symmetry}) {
+        INFO(std::string(law), std::string(cloud ? " cloud " : " lattice "), sides);
+        const auto simulation = build(pair_scene(sheet + (cloud ? "jitter = 0.2\n" : ""), law, load + sides));
+        BodyProblem& problem = simulation->problem();
+        const Expansion found = expansion(*simulation, 1.1, {0.7, 0.6, 0});
+        CHECK_MESSAGE(found.left <= 1e-11, "out of balance by ", found.left);
+        const ConstFieldView u = problem.state().displacement();
+        Field w = problem.make_field(), K = problem.make_field(), ahead = problem.make_field(), behind = problem.make_field(), moved = problem.make_field();
+        for (const std::int32_t p : problem.body().internal())
+          for (int a = 0; a < 2; ++a) w.component(a)[p] = std::sin(3.0 * p + a);
+        REQUIRE(problem.add_load_stiffness({u, 1.0}, w, K).ok());
+        const double h = 1e-6;
+        combine(1, u, h, w, moved);
+        REQUIRE(problem.external_forces({moved, 1.0}, ahead).ok());
+        combine(1, u, -h, w, moved);
+        REQUIRE(problem.external_forces({moved, 1.0}, behind).ok());
+        double off = 0;
+        for (const std::int32_t p : problem.body().internal())
+          for (int a = 0; a < 2; ++a) off = std::max(off, std::abs(K.component(a)[p] + (ahead.component(a)[p] - behind.component(a)[p]) / (2 * h)));
+        CHECK_MESSAGE(off <= 1e-7 * largest_magnitude(K), "the tangent is off by ", off / largest_magnitude(K));
+      }
+}
+
 TEST_CASE("pressure: exact totals, on one side and on a hole") {
   for (const char* kinematics : {"baqp", "bond_based"}) {
     const auto total = [&](const BodyText& body, const std::string& load, int component) {

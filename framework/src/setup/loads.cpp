@@ -40,12 +40,6 @@ Load distributed(const LoadDescription& description, const TermParts& parts, con
   return load;
 }
 
-void refuse_pressure(const LoadDescription& load, const TermParts& parts) {
-  if (!load.follower || !parts.formulation.pairs) return;
-  throw InputError(load.position, "load.pressure",
-                   "found with follower = true and a pair law, which has no deformation gradients; allowed: kinematics with gradients");
-}
-
 Pressure pressure_on(const Body& body, const SpaceTimeFunction& value, SurfaceAreas areas) {
   Pressure pressure{value, std::move(areas.points), std::move(areas.area)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -66,7 +60,6 @@ Loads build_loads(const Scene& scene, const TermParts& parts, const ImageMap* im
   for (const LoadDescription& description : scene.loads) {
     refuse_ramp(description.ramp, fmt::format("load.{}", &description - scene.loads.data()), quasi_static);
     if (description.type == LoadDescription::Type::pressure) {
-      refuse_pressure(description, parts);
       const SpaceTimeFunction value = function_of(description.components[0], description.ramp, quasi_static);
       Pressure pressure = pressure_on(body, value, surface_areas(description, parts, images));
       pressure.follows = description.follower;

@@ -15,6 +15,7 @@ void continue_gradients(const Families& families, const ImageMap& images, ConstF
     FamilyArrays family;
     families.load(static_cast<std::size_t>(p), BondsOf::intact, family);
     std::vector<double> g;
+    if (!families.needs().shapes) find_inverse_shape(family);
     point_gradient(family, families.body().horizon(), 1, g);
     for (int c = 0; c < d; ++c)
       for (int e = 0; e < d; ++e) {

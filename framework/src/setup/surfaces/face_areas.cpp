@@ -1,8 +1,8 @@
 #include <algorithm>
 
 #include "families/families.hpp"
-#include "setup/materials.hpp"
 #include "setup/surfaces/face_shares.hpp"
+#include "setup/surfaces/pair_areas.hpp"
 
 namespace perikit {
 
@@ -40,31 +40,18 @@ class UnitMaterial final : public Material {
 
 Field face_areas(TermParts parts, int axis, UnitStress unit) {
   const Body& body = parts.families->body();
+  if (parts.formulation.pairs) {
+    const Field areas = pair_areas(std::move(parts), unit == UnitStress::all_around ? -1 : axis);
+    Field area = body.make_field(1);
+    std::copy_n(areas.component(axis), body.stride(), area.data());
+    return area;
+  }
   MaterialRecord record;
   record.material = std::make_shared<UnitMaterial>(unit);
   record.traits = record.material->traits();
   record.constants.resize(1);
-  std::vector<MaterialRecord> records;
-  records.push_back(std::move(record));
-  std::vector<std::uint16_t> ids;   // images and far points store nothing here either
-  if (!body.places().place.empty()) {
-    const Laws& known = *parts.laws;
-    for (const bool far : {false, true}) {
-      records.push_back(silent_record());
-      records.back().incomplete = far;
-    }
-    ids.assign(body.stride(), 0);
-    for (const std::int32_t index : body.internal()) {
-      const auto p = static_cast<std::size_t>(index);
-      ids[p] = known.incomplete(p) ? 2 : known.record_of(p).silent ? 1 : 0;
-    }
-  } else if (body.owned().size() < body.points()) {
-    records.push_back(silent_record());
-    ids.assign(body.stride(), 1);
-    for (const std::int32_t p : body.owned()) ids[static_cast<std::size_t>(p)] = 0;
-  }
-  const Laws laws(body.space(), std::move(records), ids, body.stride());
-  parts.laws = &laws;
+  const OneLaw law(body, *parts.laws, std::move(record));
+  parts.laws = &law.laws();
   parts.stabilization = nullptr;  // a homogeneous deformation has no zero-energy part
   parts.interfaces = nullptr;  // one law on both sides
   parts.further.clear();       // they have no stress

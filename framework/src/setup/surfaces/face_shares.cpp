@@ -165,12 +165,13 @@ class Columns {
 };
 
 /// Each column of cells below the face carries what the kinematics has of it there: a homogeneous stress is then in equilibrium
-/// point by point. (On clouds no load on faces alone does that.) Pair laws have no homogeneous stress near a face: the face lies
-/// half a spacing beyond the last layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
+/// point by point. (On clouds no load on faces alone does that.) Bonds of pair laws near a face may have another stress than those inside: what they
+/// have of the face is given the total and the first moments of its cells. Local force states have no areas: the face lies half a spacing beyond the last
+/// layer, and 3/2 there and -1/2 one layer further in give the exact total and the exact moment.
 /// Of a part of a body with all ranks, which must all call it.
 FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const TermParts& parts, const ImageMap* images) {
   const Body& body = parts.families->body();
-  const bool exact = !parts.formulation.pairs && parts.formulation.force_state == ForceState::variational;
+  const bool exact = parts.formulation.force_state == ForceState::variational;
   const Field areas = exact ? face_areas(parts, face.axis, face.unit) : Field();
   const auto layers = static_cast<std::int64_t>(std::ceil(3 * body.horizon() / body.spacing()));  // that a face is felt in
   const double area = body.uniform_volume() / body.spacing();
@@ -181,7 +182,7 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
   SurfaceSamples samples;
   std::int32_t group = 0;
   std::vector<std::int32_t> groups;
-  std::int64_t thin = 0;   // columns of this rank that the opposite face reaches into
+  std::int64_t thin = 0;   // columns of this rank that the opposite face reaches into; of pair laws none: their areas across the middle of a column are whole
   const auto add = [&](std::int32_t p, double share) {
     if (p < 0) return;
     shares[p].area += share;
@@ -201,7 +202,7 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
       if (depth > 1) add(columns.below(end, 1), -0.5 * area);
       continue;
     }
-    thin += mine && depth < 2 * layers;
+    thin += !parts.formulation.pairs && mine && depth < 2 * layers;
     // What is nearer to the opposite face belongs to that one.
     for (std::int64_t k = 0; k < std::min(layers, depth / 2); ++k)
       if (const std::int32_t p = columns.below(end, k); p >= 0) add(p, face.outward * areas.data()[p]);
@@ -209,7 +210,7 @@ FaceShares on_lattice(std::vector<std::int32_t> points, const Face& face, const 
   const double wanted = static_cast<double>(counted(columns.own_faces()).all) * area, found = total_of(body, total);
   const auto finished = [&] {
     FaceShares all = in_order(shares, std::move(samples));
-    if (exact && !images && columns.part()) give_first_moments(body, all.points, all.samples, all.share);
+    if (exact && !images && (columns.part() || parts.formulation.pairs)) give_first_moments(body, all.points, all.samples, all.share);
     return all;
   };
   if (!exact) return finished();
@@ -332,18 +333,31 @@ Shares by_volumes(const std::vector<std::int32_t>& points, const Layer& layer, c
   return shares;
 }
 
-/// Points on a face take what a consistent cloud has of it; other clouds go by their volumes. Of a part of a body all ranks must call it.
+/// Points on a face take what a consistent cloud has of it; other clouds go by their volumes. Bonds of pair laws have areas on every cloud; their sum and their
+/// first moments are those that volumes say. Of a part of a body all ranks must call it.
 FaceShares on_cloud(const std::vector<std::int32_t>& points, const Face& face, const TermParts& parts, const ImageMap* images) {
   const Body& body = parts.families->body();
   const Layer layer(points, face, body);
-  const bool exact = parts.consistency && !layer.whole_cells();
-  Shares shares = exact ? by_kinematics(points, face, layer, parts, images) : by_volumes(points, layer, body);
-  ExactSum carried, seen;
-  for (const auto& [p, share] : shares)
-    if (body.owns(static_cast<std::size_t>(p))) carried.add(share.area);
+  ExactSum of_layer;
   for (const std::int32_t p : points)
-    if (layer.outer(p)) seen.add(layer.area(p));
-  const double scale = total_of(body, carried) / total_of(body, seen);
+    if (layer.outer(p)) of_layer.add(layer.area(p));
+  const double seen = total_of(body, of_layer);
+  const auto carried = [&](const Shares& shares) {
+    ExactSum sum;
+    for (const auto& [p, share] : shares)
+      if (body.owns(static_cast<std::size_t>(p))) sum.add(share.area);
+    return total_of(body, sum);
+  };
+  Shares shares;
+  bool pairs = parts.formulation.pairs != nullptr;
+  if (pairs) {
+    shares = by_kinematics(points, face, layer, parts, images);
+    const double ratio = carried(shares) / seen;
+    pairs = ratio > 0.5 && ratio < 2;   // else a face inside of the body, or one of few points
+    for (auto& [p, share] : shares) share.area /= ratio;
+  }
+  if (!pairs) shares = parts.consistency && !layer.whole_cells() ? by_kinematics(points, face, layer, parts, images) : by_volumes(points, layer, body);
+  const double scale = pairs ? 1.0 : carried(shares) / seen;
   SurfaceSamples samples;
   const auto add_group = [&](std::int32_t p, double area) {  // a point of the outer layer has a square cell of the face
     const double side = body.dimension() == 2 ? area / body.frame().section : std::sqrt(area);
@@ -353,7 +367,9 @@ FaceShares on_cloud(const std::vector<std::int32_t>& points, const Face& face, c
   for (const std::int32_t p : points)
     if (layer.outer(p)) group[p] = add_group(p, scale * layer.area(p));
   for (auto& [p, share] : shares) share.group = group.contains(p) ? group.at(p) : add_group(p, 0.0);
-  return in_order(shares, std::move(samples));
+  FaceShares all = in_order(shares, std::move(samples));
+  if (pairs && !images) give_first_moments(body, all.points, all.samples, all.share);
+  return all;
 }
 
 }  // namespace

@@ -152,20 +152,12 @@ void over_free_faces(const Body& body, std::span<const std::int32_t> points, con
         if (!occupied(body, p, k, sign)) visit(p, static_cast<std::size_t>(body.lattice()->axis[k]), sign);
 }
 
-CellFaces::CellFaces(const Body& body) : area(body.stride(), Point{}), count(body.stride(), 0) {
-  const double face = body.uniform_volume() / body.spacing();
-  over_free_faces(body, body.internal(), [&](std::int32_t p, std::size_t axis, int sign) {
-    area[static_cast<std::size_t>(p)][axis] += sign * face;
-    ++count[static_cast<std::size_t>(p)];
-  });
-}
-
 std::vector<std::int32_t> free_surface(const Body& body) {
   if (!body.lattice()) return free_surface_of_cloud(body);
-  const CellFaces faces(body);
   std::vector<std::int32_t> found;
-  std::ranges::copy_if(body.owned(), std::back_inserter(found),
-                       [&](std::int32_t p) { return faces.count[static_cast<std::size_t>(p)] > 0; });
+  over_free_faces(body, body.owned(), [&](std::int32_t p, std::size_t, int) {
+    if (found.empty() || found.back() != p) found.push_back(p);   // the faces of a cell come one after the other
+  });
   return found;
 }
 

@@ -15,14 +15,6 @@ namespace perikit {
 using FreeFace = std::function<void(std::int32_t p, std::size_t axis, int sign)>;
 void over_free_faces(const Body& body, std::span<const std::int32_t> points, const FreeFace& visit);
 
-/// Sum of the outward area vectors of the free faces of each point's cell on a lattice [m^2]: those with no point, and no image,
-/// behind them. By internal index; the number of free faces beside it. Of a part right where it has what is around a cell.
-struct CellFaces {
-  std::vector<Point> area;
-  std::vector<std::uint8_t> count;
-  explicit CellFaces(const Body& body);
-};
-
 /// Owned points at the free surface. Lattices: with a free cell face. Clouds: outside of which, along the mean direction away
 /// from the points around, no other point lies within two spacings, or within the horizon where that is less.
 std::vector<std::int32_t> free_surface(const Body& body);

@@ -9,6 +9,7 @@
 #include "setup/surfaces/face_shares.hpp"
 #include "setup/surfaces/first_moments.hpp"
 #include "setup/surfaces/free_surface.hpp"
+#include "setup/surfaces/pair_areas.hpp"
 
 namespace perikit {
 
@@ -26,44 +27,18 @@ SurfaceAreas of_face(const LoadDescription& load, const TermParts& parts, const 
   return areas;
 }
 
-/// Pair laws: the free faces of the cells lie half a spacing beyond their points, so that 3/2 there and -1/2 one point further in
-/// give the right total and the right moment.
-std::vector<Point> of_cells(const Body& body, const CellFaces& faces) {
-  const Lattice& lattice = *body.lattice();
+/// By internal index, images among them.
+std::vector<Point> all_areas(const TermParts& parts) {
+  const Body& body = parts.families->body();
   std::vector<Point> areas(body.stride(), Point{});
-  for (const std::int32_t p : body.internal()) {
-    const auto i = static_cast<std::size_t>(p);
-    if (body.image(i)) continue;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(body.dimension()); ++k) {
-      const auto c = static_cast<std::size_t>(lattice.axis[k]);
-      const double area = faces.area[i][c];
-      if (area == 0) continue;
-      std::array<int, 3> step{};
-      step[k] = area > 0 ? -1 : 1;
-      const auto inner =
-          static_cast<std::size_t>(p + lattice.shift(step));  // there, or the two faces across this axis would cancel
-      areas[i][c] += 1.5 * area;
-      areas[inner][c] -= 0.5 * area;
-    }
+  const bool pairs = parts.formulation.pairs != nullptr;
+  const Field of_pairs = pairs ? pair_areas(parts, -1) : Field();
+  for (int axis = 0; axis < body.dimension(); ++axis) {
+    const Field of_axis = pairs ? Field() : face_areas(parts, axis, UnitStress::all_around);
+    const double* const area = pairs ? of_pairs.component(axis) : of_axis.data();
+    for (const std::int32_t p : body.internal()) areas[static_cast<std::size_t>(p)][static_cast<std::size_t>(axis)] = area[p];
   }
   return areas;
-}
-
-/// By internal index, images among them.
-std::vector<Point> all_areas(const LoadDescription& load, const TermParts& parts) {
-  const Body& body = parts.families->body();
-  if (!parts.formulation.pairs) {
-    std::vector<Point> areas(body.stride(), Point{});
-    for (int axis = 0; axis < body.dimension(); ++axis) {
-      const Field of_axis = face_areas(parts, axis, UnitStress::all_around);
-      for (const std::int32_t p : body.internal()) areas[static_cast<std::size_t>(p)][static_cast<std::size_t>(axis)] = of_axis.data()[p];
-    }
-    return areas;
-  }
-  if (body.lattice()) return of_cells(body, CellFaces(body));
-  throw InputError(load.position, "load.pressure",
-                   "found on a cloud with a pair law, which has no area vectors there; allowed: lattices, kinematics with "
-                   "gradients, or a traction on a face");
 }
 
 /// To the samples of the surface the places of the points that carry it.
@@ -124,7 +99,7 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
   const Body& body = parts.families->body();
   std::vector<std::uint8_t> in_set(body.stride(), 0);
   for (const std::int32_t p : body.set(load.set)) in_set[static_cast<std::size_t>(p)] = 1;
-  const std::vector<Point> areas = all_areas(load, parts);
+  const std::vector<Point> areas = all_areas(parts);
   std::vector<SurfacePoint> surface;
   for (const std::int32_t p : free_surface(body)) {
     const auto i = static_cast<std::size_t>(p);
@@ -138,13 +113,20 @@ SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, 
                                  load.set));
   }
   const double felt = 3 * body.horizon();  // a surface is felt no deeper
+  const bool whole = counted(std::ssize(surface)).all == counted(chosen).all;
   SurfaceAreas found;
-  for (const auto& [p, share] : points_below(body, surface, felt, images, [](std::int32_t) { return true; })) {
+  const auto add = [&](std::int32_t p, double share) {
     found.points.push_back(p);
     found.area.emplace_back();
     for (std::size_t a = 0; a < 3; ++a) found.area.back()[a] = share * areas[static_cast<std::size_t>(p)][a];
+  };
+  if (whole && parts.formulation.pairs) {
+    // Inside of a cloud a uniform stress of a pair law may leave forces, too: all together they sum to zero.
+    for (const std::int32_t p : body.complete())
+      if (areas[static_cast<std::size_t>(p)] != Point{}) add(p, 1);
+  } else {
+    for (const auto& [p, share] : points_below(body, surface, felt, images, [](std::int32_t) { return true; })) add(p, share);
   }
-  const bool whole = counted(std::ssize(surface)).all == counted(chosen).all;
   if (body.lattice()) add_samples(body, in_set, found);
   if (body.lattice() && !images && !whole) exact_moments(body, found);
   if (!body.lattice() && !images && whole) add_cells(body, found);

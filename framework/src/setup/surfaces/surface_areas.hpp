@@ -20,9 +20,9 @@ struct SurfaceAreas {
 };
 
 /// What of the free surface each point has that lies nearest to a surface point of the load's set, or (face) of that side of the
-/// set. Area vectors are A_i = sum over q of W_q g_qi, the stencils' own, so that a body under the same pressure all around is in
-/// equilibrium point by point; their sum over a closed surface is zero. On lattices the total and the first moments are those of the free cell
-/// faces of the set. Pair laws have no stencils: theirs are the free cell faces, on lattices only. Of a part of a body it finds the areas of
+/// set. Area vectors are A_i = sum over q of W_q g_qi, the stencils' own, and those of pair laws what their bonds feel in a uniform expansion (pair_areas),
+/// so that a body under the same pressure all around is in equilibrium point by point; their sum over a closed surface is zero. On a part of the surface of a
+/// lattice the total and the first moments are those of the free cell faces of the set. Of a part of a body it finds the areas of
 /// the points whose forces are complete, with all ranks, which must all call it. Throws InputError where the set has no free
 /// surface.
 SurfaceAreas surface_areas(const LoadDescription& load, const TermParts& parts, const ImageMap* images);
