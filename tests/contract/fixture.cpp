@@ -21,9 +21,14 @@ std::vector<Example> examples(Kind kind) {
   for (const auto& [k, part] : subject().parts) {
     if (k != kind) continue;
     for (const std::string& table : subject().registry.describe(kind, part).examples) all.push_back({part, table});
+    // No example of the parts themselves: where factors on bonds cannot do all that they are asked for, their last digits differ between machines, and
+    // `perikit check --machine` compares examples.
+    if (kind == Kind::kinematics && (part == "bond_based" || part == "ordinary")) all.push_back({part, "surface_correction = \"moments\""});
   }
   return all;
 }
+
+double of_iterations(const Example& example) { return example.table.find("moments") != std::string::npos ? 100 : 1; }
 
 std::vector<Example> kinematics_examples() {
   std::vector<Example> all = examples(Kind::kinematics);

@@ -31,6 +31,8 @@ struct Example {
   bool keeps_angular_momentum = true;
 };
 std::vector<Example> examples(Kind kind);
+/// By how much more than rounding what is compared of two bodies may differ: factors on the bonds of pair laws are found by iterations, to about 1e-12.
+double of_iterations(const Example& example);
 /// Examples of kinematics, and `conventional` with every example of the stabilizations to test.
 std::vector<Example> kinematics_examples();
 

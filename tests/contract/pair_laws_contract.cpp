@@ -122,7 +122,7 @@ TEST_CASE("kinematics: pair laws store the classical energy density of a homogen
 
 TEST_CASE("kinematics: the surface correction of pair laws changes surfaces and not the inside") {
   for (const Example& law : pair_laws()) {
-    if (law.table.find("surface_correction") == std::string::npos) continue;
+    if (law.table.find("\"energy\"") == std::string::npos) continue;
     for (int d = 1; d <= 3; ++d) {
       INFO(law.part, " ", d, "D");
       BodyOptions options;
@@ -298,7 +298,8 @@ TEST_CASE("kinematics: pair laws have the stress of the material inside, where t
 }
 
 TEST_CASE("kinematics: pair laws have the energy density and the stress of a body that goes on beyond its sides") {
-  for (const Example& law : pair_laws())
+  for (const Example& law : pair_laws()) {
+    if (law.table.find("moments") != std::string::npos) continue;   // factors of the points beyond would be others: their surface is elsewhere
     for (int d = 1; d <= 3; ++d)
       for (const bool cloud : {false, true})
         for (const bool two_materials : {false, true})
@@ -376,6 +377,7 @@ TEST_CASE("kinematics: pair laws have the energy density and the stress of a bod
             const double energy = energy_of(here->problem(), here->problem().state().displacement());
             CHECK_MESSAGE(std::abs(total - energy) <= 1e-11 * energy, "densities add up to ", total, " of an energy of ", energy);
           }
+  }
 }
 
 TEST_CASE("kinematics: pair laws refuse what they do not have, and say what they cannot represent") {
@@ -427,4 +429,142 @@ TEST_CASE("kinematics: a pair law reports points on top of each other") {
       CHECK(!status.ok());
       CHECK(status.description.find("non-finite length") != std::string::npos);
     }
+}
+
+namespace {
+
+/// A box of n points along each axis with spacing 1.
+std::string box_text(const Example& law, int d, int n, double ratio, double jitter, const std::string& influence, double nu) {
+  const auto all = [&](double value) {
+    std::string list;
+    for (int a = 0; a < d; ++a) list += fmt::format("{}{:.1f}", a > 0 ? ", " : "", value);
+    return list;
+  };
+  return fmt::format("format = 1\n[body]\ndimension = {}\n{}[body.lattice]\nspacing = 1.0\nlower = [{}]\nupper = [{}]\n{}[family]\nhorizon_ratio = {}\ninfluence = \"{}\"\n"
+                     "[kinematics]\n{}\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = {}\n[integrator]\ntype = \"evaluate\"\n",
+                     d, d == 2 ? "plane = \"strain\"\n" : d == 1 ? "line = \"strain\"\n" : "", all(0.0), all(n), jitter > 0 ? fmt::format("jitter = {}\n", jitter) : "", ratio, influence,
+                     kinematics_table(law), nu);
+}
+
+struct UniformStrain {
+  Eigen::Matrix3d strain = Eigen::Matrix3d::Zero();
+  double energy = 0;
+};
+
+/// A small strain in all components and what the law is to store of it.
+UniformStrain uniform_strain(const BodyProblem& problem, std::uint64_t seed) {
+  const int d = problem.body().dimension();
+  UniformStrain uniform;
+  Noise random(seed);
+  for (int a = 0; a < d; ++a)
+    for (int b = 0; b <= a; ++b) uniform.strain(a, b) = uniform.strain(b, a) = 1e-6 * random();
+  const FamilyPoint point{problem.body().space(), problem.body().section(), problem.body().horizon(), problem.laws().moduli(0)};
+  double two_mu = 2 * point.moduli.mu, first = point.bulk() - two_mu / d;
+  if (problem.terms().springs_alone()) two_mu = 2 * (first = d * point.bulk() / (d + 2));
+  if (d == 1) first = point.bulk(), two_mu = 0;
+  uniform.energy = 0.5 * first * std::pow(uniform.strain.trace(), 2) + 0.5 * two_mu * uniform.strain.squaredNorm();
+  return uniform;
+}
+
+/// Energy densities over the right one, without what is of higher order in the strain; forces -> force, over stress and spacing.
+std::vector<double> ratios(BodyProblem& problem, const UniformStrain& uniform, Field& force) {
+  const Body& body = problem.body();
+  std::vector<double> ratio(body.stride(), 0.0);
+  force = body.make_field(body.dimension());
+  for (const double sign : {1.0, -1.0}) {
+    set_field(body, problem.state().displacement(), [&](const Point& x) {
+      const Eigen::Vector3d u = sign * uniform.strain * Eigen::Vector3d(x[0], x[1], x[2]);
+      return Point{u[0], u[1], u[2]};
+    });
+    PointSamples samples;
+    REQUIRE(problem.sample(samples).ok());
+    const Field f = force_of(problem, problem.state().displacement());
+    for (const std::int32_t p : body.internal()) {
+      ratio[static_cast<std::size_t>(p)] += 0.5 * samples.strain_energy_density.data()[p] / uniform.energy;
+      for (int c = 0; c < body.dimension(); ++c) force.component(c)[p] += 0.5 * sign * f.component(c)[p] / 1e-6;
+    }
+  }
+  return ratio;
+}
+
+/// How many sides of a box of n points are nearer than so far.
+int near_sides(const Body& body, std::size_t p, int n, double distance) {
+  int sides = 0;
+  for (int a = 0; a < body.dimension(); ++a) {
+    const double x = body.position(p)[static_cast<std::size_t>(a)];
+    sides += (x < distance) + (n - x < distance);
+  }
+  return sides;
+}
+
+}  // namespace
+
+TEST_CASE("kinematics: with the moments of the material uniform strains have its energy, inside of lattices and below their flat sides, and are in equilibrium") {
+  for (const Example& law : pair_laws()) {
+    if (law.table.find("moments") == std::string::npos) continue;
+    for (int d = 1; d <= 3; ++d)
+      for (const double ratio : {2.015, 3.015, 4.015, 6.015})
+        for (const double nu : {-0.9, 0.25, 0.499}) {
+          if ((d == 3 && ratio > 3.5) || (nu != 0.25 && ratio > 3.5) || (nu != 0.25 && law.part == "bond_based")) continue;
+          // A side is felt as far as its rows have other factors, and one horizon farther by what these do to moduli of points.
+          const int reach = static_cast<int>(ratio), felt = 3 * reach, n = 2 * felt + 2;
+          INFO(law.part, " ", d, "D, horizon ratio ", ratio, ", Poisson's ratio ", nu);
+          const auto simulation = build(box_text(law, d, n, ratio, 0, "cubic_spline", nu));
+          BodyProblem& problem = simulation->problem();
+          const UniformStrain uniform = uniform_strain(problem, 7);
+          Field force;
+          const std::vector<double> ratios_of = ratios(problem, uniform, force);
+          double inside = 0, sides = 0, unbalanced = 0;
+          int points[2] = {};
+          for (const std::int32_t i : problem.body().internal()) {
+            const auto p = static_cast<std::size_t>(i);
+            const int near = near_sides(problem.body(), p, n, felt);
+            if (near == 0) {
+              ++points[0];
+              inside = std::max(inside, std::abs(ratios_of[p] - 1));
+              for (int c = 0; c < d; ++c) unbalanced = std::max(unbalanced, std::abs(force.component(c)[p]));
+            } else if (near == 1) {
+              ++points[1];
+              sides = std::max(sides, std::abs(ratios_of[p] - 1));
+            }
+          }
+          REQUIRE(points[0] > 0);
+          REQUIRE(points[1] > 0);
+          CHECK_MESSAGE(inside <= 2e-11, "inside it is off by ", inside);
+          CHECK_MESSAGE(unbalanced <= 1e-11, "inside forces are ", unbalanced);
+          // Two rows to either side, of which the influence function leaves one, are too few for the moments of the rows between them.
+          if (reach > 2) CHECK_MESSAGE(sides <= 2e-11, "below sides it is off by ", sides);
+        }
+  }
+}
+
+TEST_CASE("kinematics: with the moments of the material uniform strains have its energy and are in equilibrium inside of clouds") {
+  for (const Example& law : pair_laws()) {
+    if (law.table.find("moments") == std::string::npos) continue;
+    struct Cloud {
+      int d, n;
+      double ratio, jitter;
+    };
+    for (const auto& [d, n, ratio, jitter] : {Cloud{1, 40, 5.015, 0.2}, Cloud{2, 18, 3.015, 0.1}, Cloud{2, 22, 4.015, 0.25}})
+      for (const double nu : {0.25, 0.45}) {
+        INFO(law.part, " ", d, "D, horizon ratio ", ratio, ", jitter ", jitter, ", Poisson's ratio ", nu);
+        const auto simulation = build(box_text(law, d, n, ratio, jitter, "constant", nu));
+        BodyProblem& problem = simulation->problem();
+        const UniformStrain uniform = uniform_strain(problem, 7);
+        Field force;
+        const std::vector<double> ratios_of = ratios(problem, uniform, force);
+        double inside = 0, unbalanced = 0;
+        int points = 0;
+        for (const std::int32_t i : problem.body().internal()) {
+          const auto p = static_cast<std::size_t>(i);
+          if (near_sides(problem.body(), p, n, 2 * ratio + 1) > 0) continue;
+          ++points;
+          inside = std::max(inside, std::abs(ratios_of[p] - 1));
+          for (int c = 0; c < d; ++c) unbalanced = std::max(unbalanced, std::abs(force.component(c)[p]));
+        }
+        REQUIRE(points > 0);
+        CHECK_MESSAGE(inside <= 1e-9, "inside it is off by ", inside);
+        CHECK_MESSAGE(unbalanced <= 1e-9, "inside forces are ", unbalanced);
+      }
+  }
 }

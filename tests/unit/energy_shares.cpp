@@ -15,7 +15,7 @@ namespace {
 /// phi = omega e^2/(2 r): in a homogeneous expansion by s a bond stores omega s^2 r/2.
 class Springs final : public PairKinematics {
  public:
-  PairTraits traits() const noexcept override { return {.influence = true, .constant_moduli = true, .surface_correction = false}; }
+  PairTraits traits() const noexcept override { return {.influence = true, .constant_moduli = true}; }
   PairModuli moduli(const PairPoint&) const noexcept override { return {}; }
   std::string warning(const PairPoint&) const override { return {}; }
   void bond_law(const BondBatch& b) const noexcept override {

@@ -41,7 +41,7 @@ class NoDilatation final : public DilatationLaw {
 
 class Pairs : public PairKinematics {
  public:
-  PairTraits traits() const noexcept override { return {.influence = false, .constant_moduli = true, .surface_correction = true}; }
+  PairTraits traits() const noexcept override { return {.influence = false, .constant_moduli = true, .factors = BondFactorsOf::energy}; }
   PairModuli moduli(const PairPoint&) const noexcept override { return {}; }
   std::string warning(const PairPoint&) const override { return {}; }
   void bond_law(const BondBatch&) const noexcept override {}
@@ -99,7 +99,7 @@ TEST_CASE("formulation: each class of kinematics is known by what it states") {
   CHECK(pairs.dilatation == pairs.pairs->dilatation());
   CHECK(!pairs.pair_traits.influence);
   CHECK(pairs.pair_traits.constant_moduli);
-  CHECK(pairs.pair_traits.surface_correction);
+  CHECK(pairs.pair_traits.factors == BondFactorsOf::energy);
 }
 
 TEST_CASE("formulation: a map shows its base") {

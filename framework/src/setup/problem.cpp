@@ -145,7 +145,7 @@ std::optional<Unbalanced> unbalanced(const Scene& scene, const ProblemParts& par
     return Unbalanced{"on a lattice, where a constant stress is in equilibrium already", "[body.points], or jitter > 0"};
   const auto of = [&](const char* what) { return fmt::format("with kinematics \"{}\"{}", scene.kinematics->type, what); };
   if (formulation.pairs)
-    return Unbalanced{of(", a pair law, which has neither weights nor gradients to choose"), "kinematics with gradients"};
+    return Unbalanced{of(", a pair law without factors on its bonds"), "surface_correction = \"moments\", or kinematics with gradients"};
   if (formulation.force_state == ForceState::local)
     return Unbalanced{of(" and force_state = \"local\", whose forces are not -dE/du"), "force_state = \"variational\""};
   const bool moves_gradients = formulation.point || formulation.selective();
@@ -160,6 +160,7 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
   // Cells that a held surface cuts, and images behind it, lie at random to each other.
   const bool surfaces = std::ranges::any_of(scene.boundaries, [](const BoundaryDescription& boundary) { return boundary.surface.has_value(); });
   if (!scene.consistent.value_or(scene.random_points() || surfaces)) return nullptr;
+  if (formulation.pairs && formulation.pair_traits.factors == BondFactorsOf::moments && !parts.body->lattice()) return nullptr;   // factors see to it
   if (const auto reason = unbalanced(scene, parts, formulation)) {
     if (scene.consistent)
       throw InputError(scene.consistent_position, "family.consistent",
@@ -188,6 +189,24 @@ std::shared_ptr<CloudConsistency> build_consistency(const Scene& scene, const Pr
     if (images) images->copy_from_sources(field);
   };
   return consistency;
+}
+
+/// How multipliers of bond factors reach ghosts and images.
+PointCopies copies_of_points(const ProblemParts& parts, const Images& images) {
+  PointCopies copies;
+  const auto ghosts = parts.partition ? std::make_shared<Ghosts>(*parts.partition, PointCopies::most_components) : nullptr;
+  const ImageMap* const map = parts.images.get();
+  if (!ghosts && !map) return copies;
+  copies.copy = [ghosts, map](FieldView field) {
+    if (ghosts) ghosts->forward(field);
+    if (map) map->copy_from_sources(field);
+  };
+  if (!map) return copies;
+  const Body& body = *parts.body;
+  copies.mirrored.assign(body.stride(), {1, 1, 1});
+  for (std::size_t k = 0; k < images.size(); ++k)
+    copies.mirrored[static_cast<std::size_t>(body.internal()[body.points() - images.size() + k])] = images.operation[k].sign;
+  return copies;
 }
 
 /// Refuses laws with history where forces are not the derivative of their work.
@@ -235,6 +254,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   std::unique_ptr<const BodyDamage> damage = build_damage(scene, factory, of_terms, parts.images.get(), *beyond.images, partition, quasi_static, warnings);
   steps.begin("weights");
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
+  if (of_terms.formulation.pairs && of_terms.formulation.pair_traits.factors == BondFactorsOf::moments) of_terms.copies = copies_of_points(parts, *beyond.images);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   of_terms.further = std::move(further);
   if (TermMaker point_terms = build_point_terms(scene, factory, integrator)) of_terms.further.push_back(std::move(point_terms));

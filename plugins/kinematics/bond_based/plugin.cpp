@@ -13,10 +13,10 @@ namespace {
 /// Springs: w = c e^2/(2 |xi|), the prototype microelastic law.
 class BondBased final : public PairKinematics {
  public:
-  explicit BondBased(bool surface_correction) : surface_correction_(surface_correction) {}
+  explicit BondBased(BondFactorsOf factors) : factors_(factors) {}
 
   PairTraits traits() const noexcept override {
-    return {.influence = false, .constant_moduli = true, .surface_correction = surface_correction_};
+    return {.influence = false, .constant_moduli = true, .factors = factors_};
   }
 
   PairModuli moduli(const PairPoint& x) const noexcept override { return {x.micromodulus(), 0}; }
@@ -42,8 +42,12 @@ class BondBased final : public PairKinematics {
   const DilatationLaw* dilatation() const noexcept override { return nullptr; }
 
  private:
-  bool surface_correction_;
+  BondFactorsOf factors_;
 };
+
+BondFactorsOf bond_factors(const std::string& name) {
+  return name == "moments" ? BondFactorsOf::moments : name == "energy" ? BondFactorsOf::energy : BondFactorsOf::none;
+}
 
 PartDescription description() {
   PartDescription part{.name = "bond_based",
@@ -55,7 +59,9 @@ PartDescription description() {
                        .source = "Silling, Askari, Computers & Structures 83 (2005) 1526; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 3.8-3.11",
                        .limits = "Poisson's ratio is 1/4 (3D, plane strain) or 1/3 (plane stress); of the material only its small strain counts; "
                                  "the influence function has no effect"};
-  part.parameters.choice("surface_correction", {"none", "energy"}, "\"energy\": bonds of cut families are stiffened, so that a homogeneous stretch along an axis stores as much as inside")
+  part.parameters.choice("surface_correction", {"none", "energy", "moments"},
+                         "factors on the bonds. \"none\": sums over bonds as they are, as in the papers; \"energy\": of bonds near surfaces, so that a homogeneous stretch along an axis stores as much as inside; "
+                         "\"moments\": of all bonds, so that uniform strains have the energy of the material, inside and near surfaces, and are in equilibrium inside of clouds")
       .by_default("\"none\"");
   return part;
 }
@@ -64,6 +70,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<BondBased>(values.text("surface_correction") == "energy");
+    return std::make_unique<BondBased>(bond_factors(values.text("surface_correction")));
   });
 }

@@ -25,9 +25,9 @@ class VolumeSpring final : public DilatationLaw {
 ///   K theta^2/2 + (a mu/(2m)) sum omega e_dev^2 V = (K - a mu/d^2) theta^2/2 + (a mu/(2m)) sum omega e^2 V,  a = 15 (3D), 8 (2D)
 class Ordinary final : public PairKinematics {
  public:
-  explicit Ordinary(bool surface_correction) : surface_correction_(surface_correction) {}
+  explicit Ordinary(BondFactorsOf factors) : factors_(factors) {}
 
-  PairTraits traits() const noexcept override { return {.surface_correction = surface_correction_}; }
+  PairTraits traits() const noexcept override { return {.factors = factors_}; }
 
   PairModuli moduli(const PairPoint& x) const noexcept override {
     const int d = dimension(x.space);
@@ -51,9 +51,13 @@ class Ordinary final : public PairKinematics {
   const DilatationLaw* dilatation() const noexcept override { return &volume_; }
 
  private:
-  bool surface_correction_;
+  BondFactorsOf factors_;
   VolumeSpring volume_;
 };
+
+BondFactorsOf bond_factors(const std::string& name) {
+  return name == "moments" ? BondFactorsOf::moments : name == "energy" ? BondFactorsOf::energy : BondFactorsOf::none;
+}
 
 PartDescription description() {
   PartDescription part{.name = "ordinary",
@@ -65,7 +69,9 @@ PartDescription description() {
                                     "t = omega [2 k' theta |xi| + 8 mu (e - theta |xi|/2)]/m  (2D),  t = E omega e/m  (1D)",
                        .source = "Silling et al., J. Elasticity 88 (2007) 151; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 3.14-3.20",
                        .limits = "of the material only its small strain counts; near surfaces a stretch along one axis is stored with errors of some per cent"};
-  part.parameters.choice("surface_correction", {"none", "energy"}, "\"energy\": bonds of cut families are scaled, so that a homogeneous stretch along an axis stores as much in them as inside")
+  part.parameters.choice("surface_correction", {"none", "energy", "moments"},
+                         "factors on the bonds. \"none\": sums over bonds as they are, as in the papers; \"energy\": of bonds near surfaces, so that a homogeneous stretch along an axis stores as much as inside; "
+                         "\"moments\": of all bonds, so that uniform strains have the energy of the material, inside and near surfaces, and are in equilibrium inside of clouds")
       .by_default("\"none\"");
   return part;
 }
@@ -74,6 +80,6 @@ PartDescription description() {
 
 PERIKIT_PLUGIN(registrar) {
   registrar.kinematics(description(), [](const ParameterValues& values, const PartFactory&) {
-    return std::make_unique<Ordinary>(values.text("surface_correction") == "energy");
+    return std::make_unique<Ordinary>(bond_factors(values.text("surface_correction")));
   });
 }

@@ -18,7 +18,7 @@
 ///
 /// A pair law is stated by its energy, with e = |xi + u_j - u_i| - |xi| the extension of a bond:
 ///   E = sum over pairs V_i V_j w(e; |xi|, omega, c_ij) + sum_i V_i phi(theta_i; k_i),   theta_i = (d/m_i) sum_j omega |xi| e V_j,
-///   m_i = sum_j omega |xi|^2 V_j over intact bonds,   c_ij = (c_i + c_j)/2.
+///   m_i = sum_j omega |xi|^2 V_j over intact bonds,   c_ij = f_ij (c_i + c_j)/2, f_ij: see BondFactorsOf.
 /// The engine makes extensions, dilatations, forces and tangents of it; both moduli come from the small strain of the material.
 
 #include <cstddef>
@@ -118,12 +118,16 @@ struct WeightedTraits {
   ForceState force_state = ForceState::variational;
 };
 
+/// Factors f_ij on the bonds of a pair law (w must be proportional to c_ij).
+///   energy    bonds near surfaces: a homogeneous stretch along each axis stores as much in them as in a whole family
+///   moments   all bonds: fourth moments of each family are those of an integral over it, and third ones vanish inside of clouds, so that uniform strains have the
+///             energy of the material and are in equilibrium; theta counts with omega f
+enum class BondFactorsOf { none, energy, moments };
+
 struct PairTraits {
   bool influence = true;                    ///< w or theta depends on omega
   bool constant_moduli = false;             ///< c_i depends on the material alone, not on the family
-  /// Moduli of bonds near surfaces are scaled so that a homogeneous stretch along each axis stores as much in them as in a whole
-  /// family (w must be proportional to c_ij).
-  bool surface_correction = false;
+  BondFactorsOf factors = BondFactorsOf::none;
 };
 
 /// What a library hands out: an object of exactly one of the classes below.

@@ -26,7 +26,7 @@ class CloudPairs final : public PairLoop {
   }
   std::size_t blocks() const noexcept override { return blocks_.count(); }
   std::size_t bytes() const noexcept override {
-    return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + moduli_.size() + force_.size()) * sizeof(Row);
+    return upper_.size() * sizeof(std::int64_t) + nearest_.excess.size() * sizeof(double) + (u_.size() + w_.size() + force_.size()) * sizeof(Row);
   }
   std::int64_t run(const PairPass& pass) override;
 
@@ -37,6 +37,7 @@ class CloudPairs final : public PairLoop {
     alignas(64) double dw[3][batch_points];
     alignas(64) double length[batch_points];
     alignas(64) double omega[batch_points];
+    alignas(64) double weight[batch_points];   ///< omega |xi|, times f where factors are of the dilatation
     alignas(64) double q[batch_points];        ///< q_i + q_j
     alignas(64) double dq[batch_points];
     alignas(64) double own_strain[batch_points], far_strain[batch_points];   ///< see PairFields::own_strain; near interfaces
@@ -69,7 +70,7 @@ class CloudPairs final : public PairLoop {
   Colouring colouring_;
   ArrivingPieces pieces_;
   AlignedVector<Row> u_, w_;                   ///< {u, q} and {w, dq}
-  AlignedVector<Row> moduli_;                  ///< {G_x, G_y, G_z, c}; empty where uniform
+  const double* factors_;                      ///< f by bond; null: 1
   AlignedVector<Row> force_;
 };
 
@@ -77,30 +78,25 @@ template <int D>
 CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
     : PairLoop(parts), families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
       dilatation_(parts.formulation.dilatation != nullptr), points_(families_.body().points()), blocks_(families_.body()),
-      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), pieces_(families_.body()), force_(points_) {
+      position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), pieces_(families_.body()),
+      factors_(fields_.factors.by_bond.empty() ? nullptr : fields_.factors.by_bond.data()), force_(points_) {
   for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
   const BlockReach reach = cloud_reach(families_.body(), lists_);
   colouring_ = cloud_colouring(families_.body(), lists_, blocks_, reach);
   if (parts.quiet) watch_waves(reach);
 }
 
-/// c_ij of n bonds: the mean of both ends, where surfaces are corrected times the mean ellipsoid along the bond.
+/// c_ij of n bonds without their factors: the mean of both ends.
 template <int D>
 void CloudPairs<D>::moduli(std::size_t p, const std::int32_t* neighbour, int n, const Gathered& g, double* out) const noexcept {
-  const Row *const modulus = moduli_.data(), own = modulus[p];
-  for (int l = 0; l < n; l += pack_width) (Pack(0.5) * (Pack(own[3]) + RowColumns::load(modulus, g.far + l)[3])).store(out + l);
-  for (int l = 0; l < n && fields_.crosses(p); ++l) out[l] = fields_.of_bond(p, static_cast<std::size_t>(neighbour[l]));
-  if (fields_.correction.size() == 0) return;
-  for (int l = 0; l < n; l += pack_width) {
-    const RowColumns far = RowColumns::load(modulus, g.far + l);
-    const Pack length = Pack::load(g.length + l);
-    Pack factor(0.0);
-    for (int c = 0; c < D; ++c) {
-      const Pack xi = Pack::load(g.xi[c] + l);
-      factor += (Pack(own[c]) + far[c]) * (xi * xi);
-    }
-    (Pack::load(out + l) * (Pack(0.5) * factor) / (length * length)).store(out + l);
+  if (fields_.modulus.size() == 0) {
+    std::fill_n(out, n, fields_.uniform);
+    return;
   }
+  const double* const modulus = fields_.modulus.data();
+  const Pack own(modulus[p]);
+  for (int l = 0; l < n; l += pack_width) (Pack(0.5) * (own + perikit::gather(modulus, g.far + l))).store(out + l);
+  for (int l = 0; l < n && fields_.crosses(p); ++l) out[l] = fields_.of_bond(p, static_cast<std::size_t>(neighbour[l]));
 }
 
 template <int D>
@@ -148,8 +144,14 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
       if (dilatation_) (Pack(own_w[3]) + far_w[3]).store(g.dq + l);
     }
   }
+  const double* const factor = factors_ ? factors_ + begin : nullptr;
   if constexpr (!sums) {
-    if (!moduli_.empty()) moduli(p, neighbour, n, g, s.modulus);
+    if (factor || fields_.modulus.size() > 0) moduli(p, neighbour, n, g, s.modulus);
+    for (int l = 0; l < n && factor; ++l) s.modulus[l] *= factor[l];
+  }
+  if (dilatation_) {
+    for (int l = 0; l < n; l += pack_width) (Pack::load(g.omega + l) * Pack::load(g.length + l)).store(g.weight + l);
+    for (int l = 0; l < n && factor && fields_.factors.of_dilatation; ++l) g.weight[l] *= factor[l];
   }
   // Dilatations see their own side of bonds that cross an interface.
   const bool crosses = dilatation_ && fields_.crosses(p);
@@ -161,8 +163,8 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
     if constexpr (work == PairWork::tangent) g.dq[l] = g.own_strain[l] * w_[p][3] + g.far_strain[l] * w_[j][3];
   }
   for (int l = n; l < static_cast<int>(padded(static_cast<std::size_t>(n))); ++l) {
-    g.omega[l] = g.own_strain[l] = 0;
-    if (!moduli_.empty()) s.modulus[l] = 0;
+    g.omega[l] = g.weight[l] = g.own_strain[l] = 0;
+    if (factor || fields_.modulus.size() > 0) s.modulus[l] = 0;
   }
 }
 
@@ -183,7 +185,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
   alignas(64) Gathered g;
   const double volume = position_[p][3];
   if constexpr (!sums) {
-    if (moduli_.empty())
+    if (!factors_ && fields_.modulus.size() == 0)
       for (double& c : s.modulus) c = fields_.uniform;
   }
   EightRows own;
@@ -211,7 +213,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       for (int c = 0; c < D; ++c) bond.y[c].store(s.y[c] + l);
       bond.inverse_length.store(s.inverse_length + l);
       if constexpr (rate) bond.along(dw).store(s.de + l);
-      if constexpr (sums) (Pack::load(g.omega + l) * length * Pack::load((rate ? s.de : s.e) + l)).store(g.t + l);
+      if constexpr (sums) (Pack::load(g.weight + l) * Pack::load((rate ? s.de : s.e) + l)).store(g.t + l);
     }
     if constexpr (sums) {
       double* const out = pass.out.data;
@@ -228,7 +230,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       if (pass.screen->over_share) pair_energy_shares(law_, n, g.length, g.omega, s.stiffness);
       for (int l = 0; l < n; ++l) {
         double value = s.energy[l];
-        if (pass.by_theta) value += g.omega[l] * g.length[l] * s.e[l] * ((crosses ? g.own_strain[l] : 1.0) * pass.by_theta[p] + (crosses ? g.far_strain[l] : 1.0) * pass.by_theta[neighbour[l]]);
+        if (pass.by_theta) value += g.weight[l] * s.e[l] * ((crosses ? g.own_strain[l] : 1.0) * pass.by_theta[p] + (crosses ? g.far_strain[l] : 1.0) * pass.by_theta[neighbour[l]]);
         if (pass.screen->over_share) value = s.stiffness[l] > 0 ? value / s.stiffness[l] : 0.0;
         if (g.far_volume[l] > 0) highest = std::max(highest, value);
       }
@@ -236,9 +238,9 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
     for (int l = 0; l < n && energies; l += pack_width) stored.at(l) += keep(first_lanes(n - l), Pack::load(s.energy + l) * Pack::load(g.far_volume + l));
     if constexpr (work == PairWork::energy) continue;
     for (int l = 0; l < n; l += pack_width) {
-      const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l), weight = Pack::load(g.omega + l) * Pack::load(g.length + l);
+      const Pack volumes = Pack(volume) * Pack::load(g.far_volume + l);
       Pack T = Pack::load(s.force + l);
-      if (dilatation) T += weight * Pack::load(g.q + l);
+      if (dilatation) T += Pack::load(g.weight + l) * Pack::load(g.q + l);
       RowColumns t;
       if constexpr (work == PairWork::force) {
         T = T * volumes * Pack::load(s.inverse_length + l);
@@ -247,7 +249,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
         // d(T n) = dT n + T (dw - n de)/|y|, n = y/|y|
         const Pack de = Pack::load(s.de + l), inverse_length = Pack::load(s.inverse_length + l), turn = T * volumes * inverse_length;
         Pack dT = Pack::load(s.stiffness + l) * de;
-        if (dilatation) dT += weight * Pack::load(g.dq + l);
+        if (dilatation) dT += Pack::load(g.weight + l) * Pack::load(g.dq + l);
         const Pack stretch = (dT * volumes - turn * de) * inverse_length;
         for (int c = 0; c < D; ++c) t[c] = -(stretch * Pack::load(s.y[c] + l) + turn * Pack::load(g.dw[c] + l));
       }
@@ -296,14 +298,7 @@ std::int64_t CloudPairs<D>::run(const PairPass& pass) {
     nearest_.excess.resize(points_);
   }
   if (pass.w.data) mirror_rows(pass.w, points_, w_, pass.dq.data);
-  if (fields_.modulus.size() > 0) moduli_.resize(points_);
   blocks_.over_points([&](std::size_t p) {
-    if (!moduli_.empty()) {
-      Row row{};
-      for (int c = 0; c < D && fields_.correction.size() > 0; ++c) row[c] = fields_.correction.component(c)[p];
-      row[3] = fields_.modulus.data()[p];
-      moduli_[p] = row;
-    }
     if (pass.work == PairWork::force && fails_) nearest_.excess[p] = -std::numeric_limits<double>::max();   // at rest, until it is evaluated
     if (vectors) force_[p] = Row{};
     else pass.out.data[p] = 0;

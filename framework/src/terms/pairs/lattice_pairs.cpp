@@ -44,6 +44,7 @@ class LatticePairs final : public PairLoop {
     pair_energy_shares(law_, family.bonds, family.length.data(), family.omega.data(), share.data());
     for (std::size_t s = 0; s < all.size(); ++s) inverse_share_.push_back(share[s] > 0 ? 1 / share[s] : 0.0);
     find_needed();
+    make_tables();
     length_.resize(length_.size() + batch_points, 1.0);
     omega_.resize(length_.size(), 0.0);
     inverse_length_.resize(length_.size());
@@ -51,7 +52,7 @@ class LatticePairs final : public PairLoop {
   }
 
   std::size_t blocks() const noexcept override { return families_.tiles.blocks.size(); }
-  std::size_t bytes() const noexcept override { return 3 * length_.size() * sizeof(double); }
+  std::size_t bytes() const noexcept override { return (3 * length_.size() + moduli_.size() + weights_.size()) * sizeof(double); }
 
   std::int64_t run(const PairPass& pass) override {
     reset_bad();
@@ -104,6 +105,28 @@ class LatticePairs final : public PairLoop {
     }
   }
 
+  /// c f and omega |xi| f as the loops read them.
+  void make_tables() {
+    const std::size_t slots = families_.slots.size();
+    const BondFactors& factors = fields_.factors;
+    table_size_ = slots * chunk_points + batch_points;
+    const auto write = [&](std::size_t s, const double* f) {
+      const double weight = omega_[s * chunk_points] * length_[s * chunk_points];
+      for (std::size_t l = 0; l < chunk_points; ++l) {
+        if (fields_.modulus.size() == 0) moduli_.push_back(fields_.uniform * (f ? f[l] : 1.0));
+        if (dilatation_) weights_.push_back(weight * (f && factors.of_dilatation ? f[l] : 1.0));
+      }
+    };
+    for (std::size_t t = 0; t < std::max<std::size_t>(1, factors.tables.size()); ++t) {
+      for (std::size_t s = 0; s < slots; ++s) write(s, factors.empty() ? nullptr : factors.tables[t].data() + s * chunk_points);
+      if (!moduli_.empty()) moduli_.resize((t + 1) * table_size_, 0.0);
+      if (!weights_.empty()) weights_.resize((t + 1) * table_size_, 0.0);
+    }
+  }
+  std::size_t table_of(std::int64_t p) const noexcept {
+    return fields_.factors.empty() ? 0 : static_cast<std::size_t>(fields_.factors.table_of[static_cast<std::size_t>(p / chunk_points)]);
+  }
+
   /// Whether the energies of bonds are asked for.
   template <PairWork work>
   static bool stores(const PairPass& pass) noexcept {
@@ -133,6 +156,8 @@ class LatticePairs final : public PairLoop {
   double squared_volume_;
   std::vector<std::uint8_t> needed_[2];   ///< by chunk, for forces and for dilatations; empty: all are
   AlignedVector<double> length_, omega_, inverse_length_;  ///< by slot, one value a lane
+  AlignedVector<double> moduli_, weights_;   ///< by table: c f, omega |xi| f, [slot][lane], with as many zeros behind as a batch may read; empty: moduli vary, no dilatation
+  std::size_t table_size_ = 0;
   std::vector<double> shortest_;          ///< by slot: the extension below which a bond has no length
   std::vector<double> inverse_share_;     ///< by slot: see BondStates::share
 };
@@ -140,9 +165,9 @@ class LatticePairs final : public PairLoop {
 /// c_ij of the bonds of `count` slots.
 template <int D>
 void LatticePairs<D>::moduli(const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, double* out) const noexcept {
-  const double *const of_point = fields_.modulus.data() + p, *G[D];
-  const bool crosses = fields_.crosses(static_cast<std::size_t>(p)), corrected = fields_.correction.size() > 0;
-  for (int a = 0; a < D && corrected; ++a) G[a] = fields_.correction.component(a) + p;
+  const double *const of_point = fields_.modulus.data() + p,
+               *const factor = fields_.factors.empty() ? nullptr : fields_.factors.tables[table_of(p)].data();
+  const bool crosses = fields_.crosses(static_cast<std::size_t>(p));
   const auto* const shifts = families_.slots.shifts.data();
   for (int k = 0; k < count; ++k, out += chunk_points) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
@@ -156,14 +181,8 @@ void LatticePairs<D>::moduli(const LatticePattern& pattern, std::int64_t p, std:
     }
     for (int l = 0; l < chunk_points && crosses; ++l)
       if (pattern.mask[at] >> l & 1) out[l] = fields_.of_bond(static_cast<std::size_t>(p + l), static_cast<std::size_t>(p + far + l));
-    for (int l = 0; l < chunk_points && corrected; l += pack_width) {
-      Pack g(0.0);
-      for (int a = 0; a < D; ++a) {
-        const double cosine = families_.slots.xi[at][static_cast<std::size_t>(a)] / length_[at * chunk_points];
-        g += Pack(0.5 * cosine * cosine) * (Pack::load(G[a] + l) + Pack::load(G[a] + far + l));
-      }
-      (Pack::load(out + l) * g).store(out + l);
-    }
+    for (int l = 0; l < chunk_points && factor; l += pack_width)
+      (Pack::load(out + l) * Pack::load(factor + at * chunk_points + static_cast<std::size_t>(l))).store(out + l);
   }
 }
 
@@ -187,7 +206,7 @@ void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern
   for (int k = 0; k < count; ++k) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
     const std::int64_t far = p + families_.slots.shifts[at];
-    const Pack weight(omega_[at * chunk_points] * length_[at * chunk_points]), per_share(pass.screen->over_share ? inverse_share_[at] : 1.0);
+    const Pack per_share(pass.screen->over_share ? inverse_share_[at] : 1.0);
     for (int l = 0; l < chunk_points && pattern.mask[at] != 0; l += pack_width) {
       Pack value = Pack::load(s.energy + k * chunk_points + l);
       if (pass.by_theta) {
@@ -197,7 +216,7 @@ void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern
           own *= of_own;
           other *= of_far;
         }
-        value += weight * Pack::load(s.e + k * chunk_points + l) * (own + other);
+        value += Pack::load(weights_.data() + table_of(p) * table_size_ + at * chunk_points + static_cast<std::size_t>(l)) * Pack::load(s.e + k * chunk_points + l) * (own + other);
       }
       highest[l / pack_width] = max(highest[l / pack_width], keep(static_cast<std::uint8_t>(pattern.mask[at] >> l), value * per_share));
     }
@@ -242,9 +261,9 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
   };
 
   alignas(64) PairScratch s;
-  if constexpr (!sums) {
-    if (uniform) std::fill(std::begin(s.modulus), std::end(s.modulus), fields_.uniform);
-  }
+  const std::size_t table = table_of(p) * table_size_;
+  const double *const of_moduli = moduli_.data() + table, *const weights = weights_.data() + table;
+  const auto weight = [weights](std::size_t at, int l) { return Pack::load(weights + at * chunk_points + static_cast<std::size_t>(l)); };
   Pack own[results][packs], stored[packs];
   PackMask finite[packs];
   for (PackMask& f : finite) f = Pack(0.0) == Pack(0.0);
@@ -283,7 +302,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         const Stretch<D> bond(xi, Pack(length), du);
         finite[v] &= bond.e > Pack(shortest[at]);
         if constexpr (sums) {
-          Pack term = Pack(omegas[at * chunk_points] * length * volume) * (rate ? bond.along(dw) : bond.e);
+          Pack term = Pack(volume) * Pack::load(weights + at * chunk_points + static_cast<std::size_t>(l)) * (rate ? bond.along(dw) : bond.e);
           if (weakened) term *= Pack::load(pattern.b_of(at) + l);
           if (crosses) {
             const auto [of_own, of_far] = own_strains(p + l, p + far, bits);
@@ -306,7 +325,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
       continue;
     }
     if (!uniform) moduli(pattern, p, slot, count, s.modulus);
-    law_.bond_law({count * chunk_points, lengths + slot * chunk_points, omegas + slot * chunk_points, s.e, s.modulus, energies ? s.energy : nullptr,
+    law_.bond_law({count * chunk_points, lengths + slot * chunk_points, omegas + slot * chunk_points, s.e, uniform ? of_moduli + slot * chunk_points : s.modulus, energies ? s.energy : nullptr,
                    work == PairWork::energy ? nullptr : s.force, work == PairWork::tangent ? s.stiffness : nullptr, inverse_length_.data() + slot * chunk_points});
     if (screened) screen(pass, pattern, p, slot, count, s);
     Pack sum_of[packs][D], sum_stored[packs], own_q[packs], own_dq[packs];
@@ -326,11 +345,10 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
         if (energies) sum_stored[v] += keep(bits, weakened ? b * Pack::load(s.energy + lane) : Pack::load(s.energy + lane));
         if constexpr (work == PairWork::energy) continue;
         Pack t[D], T = Pack::load(s.force + lane);
-        const Pack weight(omegas[at * chunk_points] * lengths[at * chunk_points]);
         std::array<Pack, 2> strain;
         if (crosses) strain = own_strains(p + l, p + far, bits);
         const auto of_ends = [&](Pack own_value, Pack far_value) { return crosses ? strain[0] * own_value + strain[1] * far_value : own_value + far_value; };
-        if (dilatation) T = multiply_add(weight, of_ends(own_q[v], Pack::load(q + far)), T);
+        if (dilatation) T = multiply_add(weight(at, l), of_ends(own_q[v], Pack::load(q + far)), T);
         if constexpr (work == PairWork::force) {
           T = T * Pack(squared_volume) * Pack::load(s.inverse_length + lane);
           for (int c = 0; c < D; ++c) t[c] = T * Pack::load(s.y[c] + lane);
@@ -338,7 +356,7 @@ int LatticePairs<D>::run_chunk(const LatticeChunk& chunk, const PairPass& pass, 
           // d(T n) = dT n + T (dw - n de)/|y|, n = y/|y|
           const Pack de = Pack::load(s.de + lane);
           Pack dT = Pack::load(s.stiffness + lane) * de;
-          if (dilatation) dT += weight * of_ends(own_dq[v], Pack::load(dq + far));
+          if (dilatation) dT += weight(at, l) * of_ends(own_dq[v], Pack::load(dq + far));
           const Pack inverse_length = Pack::load(s.inverse_length + lane), turn = T * Pack(-squared_volume) * inverse_length;
           const Pack stretch = (dT * Pack(-squared_volume) - turn * de) * inverse_length;
           for (int c = 0; c < D; ++c) t[c] = stretch * Pack::load(s.y[c] + lane) + turn * keep(bits, Pack::load(w[c] + far) - own_w[v][c]);

@@ -52,7 +52,6 @@ bool PairAssembly<D>::stretch(std::size_t row, ConstFieldView u, Memory& m) cons
   return finite;
 }
 
-// c_ij times the mean correction along the bond.
 template <int D>
 void PairAssembly<D>::moduli(std::size_t row, Memory& m) const {
   const PairFields& fields = points_.fields;
@@ -60,16 +59,15 @@ void PairAssembly<D>::moduli(std::size_t row, Memory& m) const {
   const std::size_t p = rows_.point(row);
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     const std::size_t q = rows_.point(static_cast<std::size_t>(neighbours[k]));
-    m.modulus[k] = fields.of_bond(p, q);
-    if (fields.correction.size() == 0) continue;
-    double factor = 0;
-    for (int c = 0; c < D; ++c) {
-      const double* G = fields.correction.component(c);
-      const double cosine = m.family.xi[c][k] / m.family.length[k];
-      factor += 0.5 * (G[p] + G[q]) * cosine * cosine;
-    }
-    m.modulus[k] *= factor;
+    m.modulus[k] = fields.factors.of(rows_.families(), p, q) * fields.of_bond(p, q);
   }
+}
+
+/// omega |xi| f of the dilatation.
+template <int D>
+double PairAssembly<D>::dilatation_weight(const Memory& m, std::size_t p, std::size_t q, std::size_t k) const {
+  const BondFactors& factors = points_.fields.factors;
+  return (factors.of_dilatation ? factors.of(rows_.families(), p, q) : 1.0) * m.omega[k] * m.family.length[k];
 }
 
 template <int D>
@@ -81,7 +79,7 @@ bool PairAssembly<D>::dilatation(std::size_t row, ConstFieldView u, Memory& m) {
   std::array<double, D> own{};
   for (std::size_t k = 0; k < bonds; ++k) {
     const std::size_t q = rows_.point(static_cast<std::size_t>(rows_.neighbours(row)[k]));
-    const double weight = scale * points_.fields.own_strain(p, q) * m.omega[k] * m.family.length[k] * m.family.volume[k];
+    const double weight = scale * points_.fields.own_strain(p, q) * dilatation_weight(m, p, q, k) * m.family.volume[k];
     theta[0] += weight * m.extension[k];
     for (std::size_t c = 0; c < D; ++c) {
       const double slope = weight * m.direction[c][k];
@@ -112,7 +110,7 @@ void PairAssembly<D>::fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K
     if (formulation_.dilatation) {
       const auto far = static_cast<std::size_t>(neighbours[k]);
       const std::size_t p = rows_.point(row), q = rows_.point(far);
-      T += m.omega[k] * m.family.length[k] * (points_.fields.own_strain(p, q) * pressure_[row] + points_.fields.own_strain(q, p) * pressure_[far]);
+      T += dilatation_weight(m, p, q, k) * (points_.fields.own_strain(p, q) * pressure_[row] + points_.fields.own_strain(q, p) * pressure_[far]);
     }
     const double volumes = rows_.volume(row) * m.family.volume[k], turn = T * m.inverse_length[k];
     double* block = m.places.block(K, neighbours[k], entries);

@@ -34,6 +34,7 @@ class PairAssembly final : public Assembly {
   /// Bonds of a row at u, one after the other. Returns whether all lengths are finite and positive.
   bool stretch(std::size_t row, ConstFieldView u, Memory& m) const;
   void moduli(std::size_t row, Memory& m) const;
+  double dilatation_weight(const Memory& m, std::size_t p, std::size_t q, std::size_t k) const;
   bool dilatation(std::size_t row, ConstFieldView u, Memory& m);
   void fill_row(std::size_t row, ConstFieldView u, BlockMatrix& K, Memory& m) const;
 

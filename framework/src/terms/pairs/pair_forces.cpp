@@ -10,17 +10,19 @@
 #include "perikit/core/warnings.hpp"
 #include "terms/family_point.hpp"
 #include "terms/pairs/pair_assembly.hpp"
-#include "terms/pairs/surface_correction.hpp"
 
 namespace perikit {
 
 template <int D>
 PairForces<D>::PairForces(const PairParts& parts)
     : families_(parts.families), body_(families_.body()), laws_(parts.laws), interfaces_(parts.interfaces), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
-  const PairLoopParts loop{families_, formulation_, fields_, share_, parts.skip};
-  loop_ = families_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (formulation_.dilatation) {
     for (Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_}) *field = body_.make_field(1);
+  }
+  switch (formulation_.pair_traits.factors) {
+    case BondFactorsOf::none: break;
+    case BondFactorsOf::energy: fields_.factors = energy_factors<D>(families_, law_, laws_); break;
+    case BondFactorsOf::moments: fields_.factors = moment_factors<D>(families_, law_, parts.copies); break;
   }
   Field modulus = body_.make_field(1);
   FamilyArrays family;
@@ -31,12 +33,13 @@ PairForces<D>::PairForces(const PairParts& parts)
   // Points with incomplete families have a record of their own, and no bond that anybody feels.
   const std::vector<MaterialRecord>& records = laws_.records();
   const bool one_law = laws_.single() || (records.size() == 2 && records[0].uniform && records[1].incomplete);
-  if (share_ && one_law && formulation_.pair_traits.constant_moduli && !formulation_.pair_traits.surface_correction) {
+  if (share_ && one_law && formulation_.pair_traits.constant_moduli) {
     fields_.uniform = law_.moduli(point(static_cast<std::size_t>(body_.owned().front()))).bond;
   } else {
     fields_.modulus = std::move(modulus);
   }
-  if (formulation_.pair_traits.surface_correction) fields_.correction = surface_correction<D>(families_, law_, laws_);
+  const PairLoopParts loop{families_, formulation_, fields_, share_, parts.skip};
+  loop_ = families_.lattice() ? make_lattice_pairs<D>(loop) : make_cloud_pairs<D>(loop);
   if (interfaces_) set_sides();
   if (parts.images) {
     const auto internal = body_.internal();
@@ -107,11 +110,19 @@ void PairForces<D>::warn(const PairPoint& x, const MaterialRecord& record) {
 
 template <int D>
 void PairForces<D>::set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus) {
-  const double m = weighted_volume(family, false), intact = 1 - families_.damage(static_cast<std::size_t>(points[0]));
+  const double intact = 1 - families_.damage(static_cast<std::size_t>(points[0]));
+  const bool own_factors = fields_.factors.of_dilatation;   // which points with equal families need not have alike
+  FamilyArrays own;
+  double m = 0;
   PairModuli moduli;
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto p = static_cast<std::size_t>(points[k]);
-    if (m > 0 && (k == 0 || !laws_.single())) {
+    const bool anew = k == 0 || (own_factors && !fields_.factors.same(static_cast<std::size_t>(points[k - 1]), p));
+    if (anew) {
+      if (k > 0) families_.load(p, BondsOf::uncut, own);
+      m = fields_.factors.weighted_volume(families_, p, k > 0 ? own : family);
+    }
+    if (m > 0 && (anew || !laws_.single())) {
       PairPoint x = point(p);
       x.weighted_volume = m;
       x.intact = intact;
@@ -140,20 +151,15 @@ template <int D>
 void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const {
   FamilyArrays& family = bonds.family;
   families_.load(p, BondsOf::intact, family);
-  for (auto* array : {&bonds.extension, &bonds.modulus, &bonds.omega, &bonds.energy, &bonds.force}) array->assign(family.size, 0.0);
+  for (auto* array : {&bonds.extension, &bonds.modulus, &bonds.omega, &bonds.factor, &bonds.energy, &bonds.force}) array->assign(family.size, 0.0);
   for (std::size_t k = 0; k < family.far.size(); ++k) {
     const auto far = static_cast<std::size_t>(family.far[k]);
     bonds.omega[k] = family.whole_omega(k);
     bonds.extension[k] = bond_stretch(family, k, p, u) * family.length[k];
     double& modulus = bonds.modulus[k];
-    modulus = fields_.of_bond(p, far);
-    if (fields_.correction.size() == 0) continue;
-    double factor = 0;
-    for (int a = 0; a < D; ++a) {
-      const double cosine = family.xi[a][k] / family.length[k];
-      factor += 0.5 * cosine * cosine * (fields_.correction.component(a)[p] + fields_.correction.component(a)[far]);
-    }
-    modulus *= factor;
+    bonds.factor[k] = fields_.factors.of(families_, p, far);
+    modulus = bonds.factor[k] * fields_.of_bond(p, far);
+    if (!fields_.factors.of_dilatation) bonds.factor[k] = 1;
   }
   law_.bond_law({family.bonds, family.length.data(), bonds.omega.data(), bonds.extension.data(), bonds.modulus.data(),
                  bonds.energy.data(), bonds.force.data(), nullptr});
@@ -224,7 +230,7 @@ void PairForces<D>::add_tensors(ConstFieldView u, PointSamples& samples) const {
       double P[D][D] = {}, tau[3][3] = {};   // tau = J sigma
       for (std::size_t k = 0; k < family.far.size() && stresses; ++k) {
         const auto far = static_cast<std::size_t>(family.far[k]);
-        const double T = 0.5 * bonds.force[k] + bonds.omega[k] * family.length[k] * fields_.own_strain(p, far) * q,
+        const double T = 0.5 * bonds.force[k] + bonds.omega[k] * bonds.factor[k] * family.length[k] * fields_.own_strain(p, far) * q,
                      factor = family.b(k) * family.volume[k] * T / (family.length[k] + bonds.extension[k]);
         double y[D];
         for (int a = 0; a < D; ++a) y[a] = family.xi[a][k] + u.component(a)[far] - u.component(a)[p];
@@ -276,7 +282,7 @@ void PairForces<D>::add_bonds(const Configuration& at, const Region& region, Bon
         const auto far = static_cast<std::size_t>(family.far[k]);
         double w = bonds.energy[k];
         if (dilates)
-          w += (of_own * fields_.own_strain(p, far) + by_theta(far) * fields_.own_strain(far, p)) * bonds.omega[k] * family.length[k] * bonds.extension[k];
+          w += (of_own * fields_.own_strain(p, far) + by_theta(far) * fields_.own_strain(far, p)) * bonds.omega[k] * bonds.factor[k] * family.length[k] * bonds.extension[k];
         samples.add({static_cast<std::int32_t>(p), family.far[k], 0.0, body_.volume(p) * family.volume[k] * family.b(k) * w});
       }
     }
@@ -371,13 +377,13 @@ void PairForces<D>::report(ModelReport& report) const {
   report.evaluation_points += share_ ? families_.bonds() / 2 : families_.bonds();
   report.bytes += loop_->bytes();
   report.resting += loop_->resting_counts();
-  for (const Field* field :
-       {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &fields_.correction, &density_, &by_theta_})
+  for (const Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &density_, &by_theta_})
     report.bytes += field->bytes();
+  fields_.factors.report(report);
   report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
   report.skips.push_back({"deformation gradients and stresses in forces", "pair law", "shape tensors, one material evaluation a point or bond"});
   if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));
-  if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, no surface correction", megabytes(static_cast<double>(body_.stride()) * 8)});
+  if (share_ && fields_.modulus.size() == 0) report.skips.push_back({"moduli by point", "one material, one modulus", megabytes(static_cast<double>(body_.stride()) * 8)});
 }
 
 std::unique_ptr<Term> make_pair_forces(const PairParts& parts) {

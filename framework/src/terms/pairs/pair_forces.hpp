@@ -17,6 +17,7 @@ struct PairParts {
   bool skip = true, share = true;
   std::shared_ptr<const Interfaces> interfaces;   ///< across these bonds are springs in series; null: nowhere
   std::shared_ptr<const Images> images;           ///< of points of the body; null: none
+  PointCopies copies;
 };
 
 /// Any pair law on any body: one loop over bonds, or two where the law has a dilatation.
@@ -49,6 +50,7 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   struct Bonds {
     FamilyArrays family;
     AlignedVector<double> extension, modulus, omega;  ///< omega: of the whole bond
+    AlignedVector<double> factor;                     ///< of its dilatation
     AlignedVector<double> energy, force;
   };
   void load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) const;

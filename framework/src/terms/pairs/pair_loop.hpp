@@ -18,6 +18,7 @@
 #include "perikit/core/point_motion.hpp"
 #include "perikit/core/simd.hpp"
 #include "perikit/operators/laws.hpp"
+#include "terms/pairs/bond_factors.hpp"
 
 namespace perikit {
 
@@ -45,7 +46,7 @@ struct PairPass {
 struct PairFields {
   Field modulus;                  ///< c_i; empty where `uniform` holds
   double uniform = 0;
-  Field correction;               ///< by axis; empty without surface correction
+  BondFactors factors;
   // Near interfaces between materials; else empty.
   std::vector<std::uint8_t> near; ///< by group of eight points
   Field sides;                    ///< see Side
@@ -54,7 +55,7 @@ struct PairFields {
   /// image that of its source), what c_i would be in a family of weighted volume 1, and whether the point stores something, 1 or 0.
   enum Side { material, distance, stiffness, of_material, stores, side_components };
   bool crosses(std::size_t p) const noexcept { return !near.empty() && near[p / padding]; }
-  /// c_ij of a bond without its correction: the mean of both ends; across an interface springs in series, each as long as the bond lies on
+  /// c_ij of a bond without its factor: the mean of both ends; across an interface springs in series, each as long as the bond lies on
   /// its side.
   double of_bond(std::size_t p, std::size_t q) const noexcept {
     if (modulus.size() == 0) return uniform;
