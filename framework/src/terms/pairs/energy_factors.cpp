@@ -62,10 +62,11 @@ BondFactors energy_factors(const Families& families, const PairKinematics& law, 
     }
   });
   const auto factor = [&](std::size_t p, std::size_t q, const double* xi, double length) {
-    double sum = 0;
+    // Exactly one between two points of whole families, wherever their chunk ends: tables leave those out.
+    double sum = 1;
     for (int a = 0; a < D; ++a) {
       const double cosine = xi[a] / length;
-      sum += 0.5 * cosine * cosine * (G.component(a)[p] + G.component(a)[q]);
+      sum += 0.5 * cosine * cosine * ((G.component(a)[p] - 1) + (G.component(a)[q] - 1));
     }
     return sum;
   };
