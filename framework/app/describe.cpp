@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "output_fields/state_field.hpp"
 #include "scene/scene.hpp"
 #include "study/study.hpp"
 
@@ -121,6 +122,19 @@ std::string section_note(const std::string& section) {
   return {};
 }
 
+std::vector<StateLine> states_of(Registry& registry, Kind kind, const PartDescription& part) {
+  std::vector<StateLine> lines;
+  if (kind != Kind::material || part.examples.empty()) return lines;
+  try {
+    const auto material = registry.material(*parse_part(kind, part.name, part.examples.front(), registry));
+    for (const StateVariable& variable : material->state(Space::solid))
+      lines.push_back({fmt::format("{}{}", state_prefix, variable.name), std::string(variable.unit), shape_of(variable, Space::solid)});
+  } catch (const std::exception&) {
+    lines.clear();   // an example that needs files: what it remembers is not known here
+  }
+  return lines;
+}
+
 std::string describe_part(Registry& registry, const std::string& part) {
   const std::size_t slash = part.find('/');
   const std::string head = part.substr(0, slash), rest = slash == std::string::npos ? "" : part.substr(slash + 1);
@@ -141,6 +155,9 @@ std::string describe_part(Registry& registry, const std::string& part) {
   section("Equations", d.equations);
   section("Source", d.source);
   section("Limits", d.limits);
+  const std::vector<StateLine> states = states_of(registry, kind, d);
+  if (!states.empty()) out += "\nStates (point fields)\n";
+  for (const StateLine& state : states) out += fmt::format("  {:<28} [{}] {}\n", state.field, state.unit, state.shape);
   if (!d.parameters.parameters().empty()) out += "\nParameters\n";
   out += parameter_lines(d.parameters);
   out += "\nExample\n";

@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <vector>
 
 #include "plugin/registry.hpp"
 
@@ -17,6 +18,12 @@ std::string section_note(const std::string& section);
 
 /// Everything that the part's tables say. `part`: KIND/NAME; or "scene", "scene/SECTION", "study", "study/SECTION" for the keys of these files.
 std::string describe_part(Registry& registry, const std::string& part);
+
+/// One a variable that a material remembers, as its example has them: name of the field, unit, shape. Empty for other kinds.
+struct StateLine {
+  std::string field, unit, shape;
+};
+std::vector<StateLine> states_of(Registry& registry, Kind kind, const PartDescription& part);
 
 /// "exactly 2 of: youngs_modulus, ..."
 std::string group_line(const ParameterGroup& group);

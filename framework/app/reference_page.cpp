@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "describe.hpp"
 #include "scene/scene.hpp"
@@ -32,11 +33,16 @@ std::string table_of(const ParameterTable& table) {
 
 std::string fenced(const std::string& text, const std::string& language = {}) { return fmt::format("```{}\n{}\n```\n", language, text); }
 
-std::string part_of(Kind kind, const PartDescription& d) {
+std::string part_of(Registry& registry, Kind kind, const PartDescription& d) {
   std::string out = fmt::format("### {}/{}\n\n{}\n\n", name(kind), d.name, d.summary);
   if (!d.equations.empty()) out += fmt::format("{}\n", fenced(d.equations));
   if (!d.source.empty()) out += fmt::format("Source: {}\n\n", d.source);
   if (!d.limits.empty()) out += fmt::format("Limits: {}\n\n", d.limits);
+  if (const std::vector<StateLine> states = states_of(registry, kind, d); !states.empty()) {
+    std::vector<std::string> texts;
+    for (const StateLine& state : states) texts.push_back(fmt::format("`{}` [{}], {}", state.field, state.unit, state.shape));
+    out += fmt::format("Remembers, as point fields: {}.\n\n", fmt::join(texts, "; "));
+  }
   out += table_of(d.parameters);
   for (const std::string& example : d.examples) {
     out += fmt::format("\n{}", fenced(fmt::format("{}\ntype = \"{}\"{}{}", kind == Kind::term ? "[[term]]" : fmt::format("[{}]", name(kind)), d.name, example.empty() ? "" : "\n", example), "toml"));
@@ -64,7 +70,7 @@ std::string reference_page(Registry& registry) {
     const auto names = registry.names(kind);
     if (names.empty()) continue;
     out += fmt::format("## Parts: {}\n\n", name(kind));
-    for (const std::string& part : names) out += part_of(kind, registry.describe(kind, part));
+    for (const std::string& part : names) out += part_of(registry, kind, registry.describe(kind, part));
   }
   while (out.ends_with("\n\n")) out.pop_back();
   return out;

@@ -140,6 +140,45 @@ TEST_CASE("kinematics: only finished steps advance the history of rate laws") {
   });
 }
 
+TEST_CASE("kinematics: fields of states are averages over evaluation points by their weights") {
+  for_every_model([](BodyProblem& problem) {
+    walk(problem);
+    PointSamples samples{.asked = Sampling::cauchy | Sampling::H};
+    REQUIRE(problem.terms().sample({deformed(problem, 33, 0.01), 0}, samples).ok());
+    const std::span<const std::int32_t> points = problem.body().internal();
+    const int d = problem.dimension(), components = d == 3 ? 6 : d == 2 ? 4 : 3;
+    const std::vector<int> diagonal = d == 3 ? std::vector{0, 3, 5} : d == 2 ? std::vector{0, 2, 3} : std::vector{0, 1, 2};
+    const auto average = [&](std::string_view name) {
+      std::vector<double> values(points.size() * static_cast<std::size_t>(components), std::numeric_limits<double>::quiet_NaN());
+      problem.terms().average_state(name, static_cast<std::size_t>(components), points, values);
+      return values;
+    };
+    const std::vector<double> stress = average("unrotated_stress"), stretch = average("stretch");
+    double scale = 0, worst = 0, worst_stretch = 0;
+    bool others = true;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const auto p = static_cast<std::size_t>(points[k]);
+      if (problem.laws().record_of(p).material->state_components(problem.laws().space()) == 0) {
+        others = others && stress[k * static_cast<std::size_t>(components)] == 0;
+        continue;
+      }
+      // sigma = R s R^T has the trace of s at every evaluation point.
+      double trace = 0, of_cauchy = 0;
+      for (std::size_t a = 0; a < 3; ++a) {
+        trace += stress[k * static_cast<std::size_t>(components) + static_cast<std::size_t>(diagonal[a])];
+        of_cauchy += samples.cauchy.component(static_cast<int>(4 * a))[p];
+      }
+      scale = std::max(scale, std::abs(of_cauchy));
+      worst = std::max(worst, std::abs(trace - of_cauchy));
+      if (d == 1) worst_stretch = std::max(worst_stretch, std::abs(stretch[3 * k] - samples.H.component(0)[p]));
+    }
+    CHECK(scale > 0);
+    CHECK_MESSAGE(worst <= 1e-12 * scale, "the trace of the mean stress is off by ", worst, " of ", scale);
+    CHECK_MESSAGE(worst_stretch <= 1e-14, "stretches are off by ", worst_stretch);
+    CHECK_MESSAGE(others, "a law without the variable has values of it");
+  });
+}
+
 TEST_CASE("kinematics: a rigid rotation turns the forces of rate laws and does no work") {
   for_every_model([](BodyProblem& problem) {
     if (problem.dimension() == 1) return;

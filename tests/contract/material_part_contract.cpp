@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/contract/fixture.hpp"
@@ -96,6 +97,28 @@ TEST_CASE("material: an inadmissible deformation is named, and its neighbours do
 
 TEST_CASE("material: a law with history follows paths: objective, exact tangent, its history in its own place, its energy accounted for") {
   for_every_example([](const Material& material, const std::vector<double>& constants, const MaterialOptions& options) { check_history(material, constants, options); });
+}
+
+TEST_CASE("material: what a law remembers has names, units and shapes that fields can have") {
+  const auto name_is_sound = [](std::string_view name) {
+    return !name.empty() && std::ranges::all_of(name, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; });
+  };
+  for (const Example& example : examples(Kind::material)) {
+    INFO(label(example));
+    const auto material = subject().registry.material(*values_of(example));
+    for (const Space space : {Space::solid, Space::plane_strain, Space::plane_stress, Space::line_strain, Space::line_stress}) {
+      const std::span<const StateVariable> state = material->state(space);
+      const int symmetric = dimension(space) == 3 ? 6 : dimension(space) == 2 ? 4 : 3;
+      for (std::size_t k = 0; k < state.size(); ++k) {
+        const StateVariable& variable = state[k];
+        CHECK_MESSAGE(name_is_sound(variable.name), "a variable is named '", variable.name, "': allowed are lower case letters, digits and underscores");
+        CHECK_MESSAGE(!variable.unit.empty(), variable.name, " has no unit: \"-\" says that it has none");
+        CHECK_MESSAGE((variable.components == 1 || variable.components == symmetric || variable.components == tensor_components(space)), variable.name, " has ", variable.components,
+                      " components: a number has 1, a symmetric tensor ", symmetric, ", a tensor ", tensor_components(space));
+        for (std::size_t other = 0; other < k; ++other) CHECK_MESSAGE(state[other].name != variable.name, "two variables are named ", variable.name);
+      }
+    }
+  }
 }
 
 TEST_CASE("material: constants are complete, finite and repeatable, and the small-strain moduli are stable") {

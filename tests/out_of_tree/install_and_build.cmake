@@ -68,6 +68,12 @@ list(GET last 9 dissipated)
 if(NOT dissipated GREATER 0)
   message(FATAL_ERROR "the scene of a material with history dissipates ${dissipated} J")
 endif()
+must_contain("${columns}" ",viscous")
+list(GET last 11 viscous)
+if(NOT viscous GREATER 0)
+  message(FATAL_ERROR "the law of that scene remembers a strain of ${viscous}")
+endif()
+run(${prefix}/bin/perikit plot my_memory/build/out --field state:viscous_strain --component xx -o viscous.png)
 
 # A term that nobody here foresaw, in an explicit run (its project's) and in a static one.
 run(${prefix}/bin/perikit new term growing)

@@ -57,6 +57,8 @@ def scene(kinematics, dimension=2, cloud=False, integrator='type = "verlet"\nend
              3: ["0.01*sin(x)*cos(y/2)", "0.004*cos(x/5 + y)", "0.003*sin(z - x/4)"]}[dimension]
     length = cells[0]
     fields = ["displacement", "velocity", "internal_force", "external_force", "strain_energy_density", "reaction"]
+    if "hypoelastic" in material:
+        fields = ["state:unrotated_stress", "state:work"] + fields
     return """format = 1
 [body]
 dimension = {dimension}

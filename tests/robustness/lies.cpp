@@ -23,6 +23,7 @@ const std::vector<Lie> lies{
     {"wrong_stress", "material", {"material: stress is the derivative of the energy, the tangent that of the stress"}},
     {"twice_the_bulk", "material", {"material: a law that tells shape and volume apart is the sum of both"}},
     {"half_told", "material", {"material: a law with history follows paths: objective, exact tangent, its history in its own place, its energy accounted for"}},
+    {"loud", "material", {"material: what a law remembers has names, units and shapes that fields can have"}},
     {"forgotten_lane", "material", {"material: a batch is its points one at a time, writes all of its outputs and nothing else"}},
     {"one_sided", "kinematics", {"kinematics: bitwise the same for one, two and three threads, and to rounding without savings"}},
     {"opposite_force", "kinematics", {"kinematics: force = -dE/du, tangent = dF/du, symmetric"}},

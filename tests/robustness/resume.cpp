@@ -69,7 +69,7 @@ TEST_CASE("resume: laws remember what happened at parts of families that are too
       .further = "[initial]\nvelocity = [\"-0.09*sin(-0.498*x + 0.851*y + 3.37)\", \"0.073*sin(-0.151*x + 1.036*y + 4.24)\"]\n"
                  "[[region]]\nset = \"part\"\nmaterial = { type = \"hypoelastic\", density = 333.3, shear_modulus = 2231.3, bulk_modulus = 21569.6 }\n"
                  "[damage]\ntype = \"max_stress\"\nstrength = 47.36\nno_fail = [\"low\"]\ngradual = true\n"
-                 "[output]\nframes = 3\nhistory_every = 1\nfields = [\"displacement\", \"velocity\", \"damage\"]",
+                 "[output]\nframes = 3\nhistory_every = 1\nfields = [\"displacement\", \"velocity\", \"damage\", \"state:unrotated_stress\"]",
       .integrator = "type = \"verlet\"\nend_time = 1.2\nestimate = \"bond_based\""};
   goes_on_alike(scene, 60);
 }
@@ -79,7 +79,7 @@ TEST_CASE("resume: points whose bonds have all failed keep what their laws remem
       .space = "stress", .spacing = 0.25, .lower = {-3.0, 0.0}, .upper = {-1.0, 2.0}, .kinematics = "type = \"conventional\"\nstabilization = \"silling\"",
       .material = "type = \"hypoelastic\"\ndensity = 127.877\nyoungs_modulus = 2335.36\npoisson_ratio = 0.3",
       .further = "[initial]\nvelocity = [\"1.8*sin(-1.0849*x - 1.4273*y + 2.63)\", \"1.6*sin(1.3494*x - 1.3491*y + 3.42)\"]\n[damage]\ntype = \"critical_stretch\"\nstretch = 0.06\n"
-                 "[output]\nframes = 3\nhistory_every = 1\nfields = [\"displacement\", \"damage\", \"deformation_gradient\", \"first_piola\"]",
+                 "[output]\nframes = 3\nhistory_every = 1\nfields = [\"displacement\", \"damage\", \"deformation_gradient\", \"first_piola\", \"state:stretch\"]",
       .integrator = "type = \"verlet\"\nend_time = 0.8\nsafety = 0.5"};
   for (const std::string jitter : {"0.0", "0.2"}) {
     CAPTURE(jitter);

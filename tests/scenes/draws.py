@@ -67,8 +67,8 @@ class Draws:
         return rounded(value)
 
     def choices(self, key):
-        """The words that a key may be."""
-        return re.findall(r'"([^"]*)"', key.allowed)
+        """The words that a key may be, those apart that depend on the laws of the scene."""
+        return [word for word in re.findall(r'"([^"]*)"', key.allowed) if not word.endswith(":NAME")]
 
     def filled(self, table, hints, share=0.3, leave=(), section=""):
         """A section: required keys, others with this probability, as many of each group as it asks for."""

@@ -171,8 +171,15 @@ class Generator(Conditions):
         if "frames" not in output and "every" not in output and "times" not in output:
             output["frames"] = 3
         if "fields" in output:
-            output["fields"] = sorted({"displacement", *(["velocity"] if self.dynamic else []), *self.fields_of_parts(output["fields"])})
+            output["fields"] = sorted({"displacement", *(["velocity"] if self.dynamic else []), *self.fields_of_parts(output["fields"]), *self.states(scene)})
         return output
+
+    def states(self, scene):
+        """Fields of what the laws of the scene remember."""
+        if self.kinematics_name in PAIR_LAWS:
+            return []
+        laws = [scene["material"], *(region["material"] for region in scene.get("region", []))]
+        return [state for law in laws for state in self.tables.states.get(as_table(law)["type"], [])]
 
     def columns(self):
         """Columns of the history: any field, over a set."""

@@ -28,6 +28,7 @@ class Table:
 class Tables:
     sections: dict   # "body.lattice" -> Table
     parts: dict      # "kinematics" -> {"baqp" -> Table}
+    states: dict = field(default_factory=dict)   # "hypoelastic" -> ["state:work", ...]: what laws remember, as fields
 
 
 def read_tables(program):
@@ -37,7 +38,7 @@ def read_tables(program):
 
 def parse_tables(page):
     tables = Tables({}, {})
-    table = None
+    table = part = None
     for line in page.split("\n"):
         heading = re.match(r"### (.+)", line)
         if heading:
@@ -51,6 +52,8 @@ def parse_tables(page):
             elif re.match(r"\[[\w.]+\]$", name):
                 tables.sections[name[1:-1]] = table
             continue
+        if part is not None and line.startswith("Remembers, as point fields: "):
+            tables.states[part.group(2)] = re.findall(r"`(state:\w+)`", line)
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] if line.startswith("| `") else []
         if table is not None and len(cells) == 5:
             name = cells[0].strip("`")

@@ -124,6 +124,13 @@ with tempfile.TemporaryDirectory() as name:
     refused(lambda: perikit.run(folder / "bar.toml", folder / "bad", {"integrator.max_iterations": 1, "integrator.cut_backs": 0, "material.type": "hencky", "load.0.traction": [600.0, 0]}),
             perikit.RunFailed, "no equilibrium")
     refused(lambda: perikit.Results(folder / "nowhere"), FileNotFoundError, "nowhere")
+    law = {"type": "hypoelastic", "youngs_modulus": 1000.0, "poisson_ratio": 0.25}
+    remembering = perikit.run(folder / "bar.toml", folder / "remembering", {"constants.n": 4, "material": law, "output.fields": ["cauchy", "state:unrotated_stress", "state:work"]})
+    assert remembering.fields() == ["cauchy", "state:unrotated_stress", "state:work"] and remembering.field("state:work").shape == (32,)
+    stress = remembering.field("state:unrotated_stress")
+    assert stress.shape == (32, 3, 3) and numpy.allclose(numpy.trace(stress, axis1=1, axis2=2), numpy.trace(remembering.field("cauchy"), axis1=1, axis2=2))
+    assert numpy.array_equal(remembering.table()["state:unrotated_stress_xy"], stress[:, 0, 1])
+    refused(lambda: remembering.field("state:wrok"), KeyError, "state:wrok", "state:work")
     refused(lambda: results.field("velocity"), KeyError, "velocity", "von_mises")
     refused(lambda: results.field("cauchy", 77), IndexError, "77")
     refused(lambda: results.field("cauchy", -77), IndexError, "-77")

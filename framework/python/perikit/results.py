@@ -1,6 +1,7 @@
 """The folder of a run."""
 
 import pathlib
+import re
 import tomllib
 
 import h5py
@@ -76,15 +77,16 @@ class Results:
     def fields(self, frame=-1):
         """Names of the point fields that a frame holds."""
         with self._frame(frame)[0] as file:
-            return sorted(file)
+            return sorted(re.sub("^state_", "state:", name) for name in file)
 
     def field(self, name, frame=-1):
         """A point field of a frame (negative: from the last): scalars (points,), vectors (points, 3), tensors (points, 3, 3)."""
         file, index = self._frame(frame)
         with file:
-            if name not in file:
-                raise KeyError(f"no field '{name}' in frame {index} of {self.folder}; there are: {', '.join(sorted(file))}")
-            values = file[name][()]
+            dataset = re.sub("^state:", "state_", name)
+            if dataset not in file:
+                raise KeyError(f"no field '{name}' in frame {index} of {self.folder}; there are: {', '.join(self.fields(frame))}")
+            values = file[dataset][()]
         return values.reshape(-1, 3, 3) if values.ndim == 2 and values.shape[1] == 9 else values
 
     def deformed(self, frame=-1, factor=1.0):

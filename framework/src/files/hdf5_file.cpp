@@ -160,6 +160,12 @@ void NewFile::attribute(const std::string& name, const std::string& text) {
   write_attribute(file_.get(), name, type.get(), type.get(), &characters);
 }
 
+void NewFile::attribute_of(const std::string& path, const std::string& name, const std::string& text) {
+  const Handle dataset = checked(H5Dopen2(file_.get(), path.c_str(), H5P_DEFAULT), H5Dclose, path), type = utf8_type(name);
+  const char* characters = text.c_str();
+  write_attribute(dataset.get(), name, type.get(), type.get(), &characters);
+}
+
 void NewFile::external_link(const std::string& path, const std::string& file) {
   check(H5Lcreate_external(file.c_str(), "/", file_.get(), path.c_str(), H5P_DEFAULT, H5P_DEFAULT), path);
 }
@@ -350,11 +356,19 @@ std::int64_t Source::integer(const std::string& group, const std::string& name) 
 
 std::string Source::text(const std::string& group, const std::string& name) const {
   char* characters = nullptr;
-  const Handle type = utf8_type(name);
-  if (H5Aread(attribute(group, name).get(), type.get(), &characters) < 0) refuse(group, fmt::format("'{}' is not text", name));
+  // Of an object behind an external link HDF5 1.10 looks for texts in the wrong file unless the object is open.
+  const Handle type = utf8_type(name), object(H5Oopen(file_.get(), group.c_str(), H5P_DEFAULT), H5Oclose);
+  if (!object) refuse(group, fmt::format("no attribute '{}'", name));
+  const Handle handle(H5Aopen(object.get(), name.c_str(), H5P_DEFAULT), H5Aclose);
+  if (!handle) refuse(group, fmt::format("no attribute '{}'", name));
+  if (H5Aread(handle.get(), type.get(), &characters) < 0) refuse(group, fmt::format("'{}' is not text", name));
   const std::string text = characters ? characters : "";
   H5free_memory(characters);
   return text;
+}
+
+bool Source::has_attribute(const std::string& path, const std::string& name) const {
+  return H5Aexists_by_name(file_.get(), path.c_str(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
 }  // namespace perikit::hdf5

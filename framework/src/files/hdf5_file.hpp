@@ -65,6 +65,8 @@ class NewFile {
   void attribute(const std::string& name, double value);
   void attribute(const std::string& name, std::int64_t value);
   void attribute(const std::string& name, const std::string& text);
+  /// The same of a dataset.
+  void attribute_of(const std::string& path, const std::string& name, const std::string& text);
   /// `path` in this file shows the root group of `file` (relative to the folder that this file lies in).
   void external_link(const std::string& path, const std::string& file);
   bool contains(const std::string& path) const;
@@ -132,7 +134,9 @@ class Source {
   std::vector<std::size_t> shape(const std::string& path) const;
   double real(const std::string& group, const std::string& attribute) const;
   std::int64_t integer(const std::string& group, const std::string& attribute) const;
+  /// Of a group or of a dataset.
   std::string text(const std::string& group, const std::string& attribute) const;
+  bool has_attribute(const std::string& path, const std::string& attribute) const;
 
  private:
   [[noreturn]] void refuse(const std::string& what, const std::string& message) const;

@@ -12,6 +12,7 @@
 #include "output/recorder.hpp"
 #include "output/result_file.hpp"
 #include "output/xdmf.hpp"
+#include "output_fields/state_field.hpp"
 #include "perikit/core/errors.hpp"
 
 namespace perikit {
@@ -219,13 +220,15 @@ void FrameWriter::begin(double time, std::int64_t step) {
   });
 }
 
-void FrameWriter::add(const std::string& name, int width, std::span<const double> values) {
+void FrameWriter::add(const std::string& field, int width, std::span<const double> values, const std::string& unit) {
   Implementation& self = *implementation_;
+  const std::string name = dataset_of(field);
   self.with_frame([&](Implementation::Frame& frame) {
     if (frame.fields.empty() || frame.fields.back().name != name) {
       self.end_field();
       frame.fields.push_back({name, width});
       frame.rows.emplace(frame.file.rows(name, self.points, width));
+      if (!unit.empty()) frame.file.attribute_of(name, "unit", unit);
       frame.values = 0;
     }
     frame.values += values.size();
@@ -235,14 +238,16 @@ void FrameWriter::add(const std::string& name, int width, std::span<const double
   });
 }
 
-std::uint64_t FrameWriter::reserve(const std::string& name, int width) {
+std::uint64_t FrameWriter::reserve(const std::string& field, int width, const std::string& unit) {
   Implementation& self = *implementation_;
+  const std::string name = dataset_of(field);
   std::uint64_t first = 0;
   self.with_frame([&](Implementation::Frame& frame) {
     self.end_field();
     frame.rows.reset();
     frame.fields.push_back({name, width});
     first = frame.file.reserve(name, self.points, width);
+    if (!unit.empty()) frame.file.attribute_of(name, "unit", unit);
     frame.file.check();
   });
   return first;
@@ -266,7 +271,7 @@ void FrameWriter::finish() { implementation_->finish(); }
 
 void FrameWriter::write(double time, std::int64_t step, std::span<const OutputField> fields) {
   begin(time, step);
-  for (const OutputField& field : fields) add(field.name, field.width, field.data);
+  for (const OutputField& field : fields) add(field.name, field.width, field.data, field.unit);
   end();
   finish();
 }

@@ -16,6 +16,7 @@
 #include "output/picture/gnuplot.hpp"
 #include "output/result_file.hpp"
 #include "output_fields/point_field.hpp"
+#include "output_fields/state_field.hpp"
 #include "perikit/core/errors.hpp"
 
 namespace perikit {
@@ -63,13 +64,14 @@ hdf5::Source::Array read_field(const ResultFile& results, const std::string& gro
                                std::size_t points) {
   const hdf5::Source& source = results.source();
   std::vector<std::string> known = source.names(group, true);
+  for (std::string& name : known) name = field_of(std::move(name));
   for (const char* name : {"volume", "material_id", "id"}) known.emplace_back(name);
   if (std::find(known.begin(), known.end(), field) == known.end()) {
     throw InputError({results.path().string(), 0, 0}, "field",
                      fmt::format("found '{}'; this run has {}{}", field, fmt::join(known, ", "),
-                                 find_point_field(field) ? "; what a run writes stands in its scene: [output] fields" : did_you_mean(field, known)));
+                                 find_point_field(field) || names_state(field) ? "; what a run writes stands in its scene: [output] fields" : did_you_mean(field, known)));
   }
-  const std::string path = source.contains(group + "/" + field) ? group + "/" + field : "/reference/" + field;
+  const std::string frame = group + "/" + dataset_of(field), path = source.contains(frame) ? frame : "/reference/" + field;
   hdf5::Source::Array array = source.read(path);
   if (array.rows() != points) {
     throw InputError({results.path().string(), 0, 0}, path,
@@ -192,7 +194,11 @@ void plot_frame(const PlotOptions& options, const ResultFile& results, std::int6
   const hdf5::Source::Array position = source.read("/reference/position"), volume = source.read("/reference/volume");
   const std::size_t points = position.rows();
   const hdf5::Source::Array data = read_field(results, group, options.field, points);
-  const FieldValues values = field_values(options.field, data.width(), data.data, options.component);
+  FieldValues values = field_values(options.field, data.width(), data.data, options.component);
+  if (const std::string path = group + "/" + dataset_of(options.field); source.has_attribute(path, "unit")) {
+    const std::string unit = source.text(path, "unit");
+    values.unit = unit == "-" ? "" : unit;
+  }
 
   std::vector<double> drawn = position.data;
   if (options.deformed != 0) {
@@ -244,7 +250,7 @@ fs::path plot(const PlotOptions& options) {
   const std::int64_t frame = options.frame.value_or(results.frames().empty() ? 0 : results.frames().back());
   const std::string component = options.component.empty() ? "" : fmt::format("_{}", options.component);
   const fs::path picture =
-      options.output.empty() ? folders.front() / fmt::format("{}{}_{}.png", options.field, component, frame_name(frame)) : options.output;
+      options.output.empty() ? folders.front() / fmt::format("{}{}_{}.png", dataset_of(options.field), component, frame_name(frame)) : options.output;
   plot_frame(options, results, frame, picture);
   return picture;
 }

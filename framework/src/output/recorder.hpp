@@ -61,11 +61,11 @@ class FrameWriter {
   void write(double time, std::int64_t step, std::span<const OutputField> fields);
   // The same file from pieces, so that nobody needs all of a frame at once, and without waiting for the disk.
   void begin(double time, std::int64_t step);
-  /// The next rows of a field; those of one field follow each other.
-  void add(const std::string& name, int width, std::span<const double> values);
+  /// The next rows of a field; those of one field follow each other. unit: of fields that are not in the table, an attribute of the dataset.
+  void add(const std::string& name, int width, std::span<const double> values, const std::string& unit = {});
   /// In place of `add`: room for all rows of a field, which somebody else writes into file() before the frame ends, as numbers of
   /// 64 bits from the byte that is returned on.
-  std::uint64_t reserve(const std::string& name, int width);
+  std::uint64_t reserve(const std::string& name, int width, const std::string& unit = {});
   /// The file of the frame that was begun; it has another name when it is complete.
   const std::filesystem::path& file() const;
   /// The frame goes to the disk on a thread of its own, which nothing else of HDF5 may run beside: finish() first. What fails there is

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "output_fields/state_field.hpp"
+
 namespace perikit {
 
 namespace {
@@ -38,7 +40,7 @@ std::string data_item(const std::string& file, const std::string& name, std::siz
 
 std::string attribute(const std::string& file, const std::string& name, std::size_t points, int width, const char* number) {
   const char* kind = width == 9 ? "Tensor" : width == 3 ? "Vector" : "Scalar";
-  return fmt::format("        <Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", escaped(name), kind,
+  return fmt::format("        <Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", escaped(field_of(name)), kind,
                      data_item(file, name, points, width, number));
 }
 

@@ -17,6 +17,7 @@ struct OutputField {
   std::string name;
   int width = 1;                       ///< 1, 3 or 9
   std::vector<double> data;            ///< width * points
+  std::string unit{};                  ///< of what laws remember; that of other fields stands in the table
 };
 
 struct PointField {
@@ -26,10 +27,10 @@ struct PointField {
   Sampling samples;                                   ///< what is sampled for it
   std::string label, unit;                            ///< as pictures show them
   std::vector<double> (*compute)(PointFields& from);  ///< width * points
-
-  /// Of a row, in its order: "x" ... for vectors (as many as the body has dimensions; 0: 3), "xx" ... for tensors, none for scalars.
-  std::vector<std::string> components(int dimension) const;
 };
+
+/// Of a row of so many numbers, in its order: "x" ... for vectors (as many as the body has dimensions; 0: 3), "xx" ... for tensors, none for scalars.
+std::vector<std::string> field_components(int width, int dimension);
 
 /// In the order of the documentation.
 const std::vector<PointField>& point_fields();

@@ -49,7 +49,7 @@ const PointField* find_point_field(std::string_view name) {
   return found == point_fields().end() ? nullptr : &*found;
 }
 
-std::vector<std::string> PointField::components(int dimension) const {
+std::vector<std::string> field_components(int width, int dimension) {
   std::vector<std::string> names;
   const std::string axes = "xyz";
   if (width == 3)
@@ -60,8 +60,7 @@ std::vector<std::string> PointField::components(int dimension) const {
   return names;
 }
 
-int PointFields::column(const std::string& name, const std::string& component) {
-  const int w = find_point_field(name)->width;
+int PointFields::column(int w, const std::string& component) {
   const auto axis = [&](char c) {
     if (c < 'x' || c > 'z') throw std::out_of_range(component);
     return c - 'x';
@@ -107,7 +106,8 @@ std::vector<double> PointFields::tensor(ConstFieldView field, bool identity) con
 
 Sampling PointFields::samples_of(std::span<const std::string> names) {
   Sampling all = Sampling::nothing;
-  for (const std::string& name : names) all = all | find_point_field(name)->samples;
+  for (const std::string& name : names)
+    if (!names_state(name)) all = all | find_point_field(name)->samples;
   return all;
 }
 
@@ -123,11 +123,28 @@ const OutputField& PointFields::get(const std::string& name) {
 }
 
 OutputField PointFields::at(const std::string& name, std::span<const std::int32_t> points) {
+  if (names_state(name)) return state(name, points);
   const PointField* field = find_point_field(name);
   if (!field) throw std::out_of_range("point field " + name);
   expect({&name, 1});
   rows_ = points;
   return {name, field->width, field->compute(*this)};
+}
+
+OutputField PointFields::state(const std::string& name, std::span<const std::int32_t> points) {
+  const Laws& laws = problem_.laws();
+  std::vector<const Material*> materials;
+  for (const MaterialRecord& record : laws.records()) materials.push_back(record.material.get());
+  const std::vector<StateField> all = state_fields(materials, laws.space());
+  const auto field = std::ranges::find(all, name, &StateField::name);
+  if (field == all.end() || field->width == 0) throw std::out_of_range("point field " + name);
+  const auto components = static_cast<std::size_t>(field->components);
+  std::vector<double> values(components * points.size());
+  problem_.terms().average_state(variable_of(name), components, points, values);
+  if (field->width == 1) return {name, 1, std::move(values), field->unit};
+  OutputField out{name, field->width, std::vector<double>(9 * points.size()), field->unit};
+  for (std::size_t p = 0; p < points.size(); ++p) write_row(laws.space(), std::span(values).subspan(p * components, components), &out.data[9 * p]);
+  return out;
 }
 
 std::vector<double> PointFields::acceleration() {

@@ -10,6 +10,7 @@
 
 #include "output_fields/crack_areas.hpp"
 #include "output_fields/point_field.hpp"
+#include "output_fields/state_field.hpp"
 #include "perikit/problem/motion.hpp"
 #include "problem/body_problem.hpp"
 
@@ -20,8 +21,8 @@ class PointFields {
   /// moves: the state has a velocity, which dynamic runs always have.
   PointFields(BodyProblem& problem, bool dynamic, bool moves) : problem_(problem), dynamic_(dynamic), moves_(dynamic || moves) {}
 
-  /// Column of a row by component name ("x", "xy"); -1 for "magnitude". Throws std::out_of_range for an unknown one.
-  static int column(const std::string& name, const std::string& component);
+  /// Column of a row of so many numbers by component name ("x", "xy"); -1 for "magnitude". Throws std::out_of_range for an unknown one.
+  static int column(int width, const std::string& component);
 
   /// Forget what was computed: the state has changed.
   void renew() {
@@ -31,7 +32,7 @@ class PointFields {
   const OutputField& get(const std::string& name);
   /// The rows of these points of this rank alone, internal indices, in their order.
   OutputField at(const std::string& name, std::span<const std::int32_t> points);
-  /// These, names of point_fields(), are asked for next: what they are made of is sampled once.
+  /// These, names of point_fields() or of states, are asked for next: what they are made of is sampled once.
   void expect(std::span<const std::string> names);
   /// They are asked for at the end of the step whose forces are evaluated next.
   void expect_after_step(std::span<const std::string> names) { problem_.sample_along(samples_of(names)); }
@@ -61,6 +62,8 @@ class PointFields {
     made.now = true;
     return made.field;
   }
+  /// What the laws remember by this name, averaged over the evaluation points of each point.
+  OutputField state(const std::string& name, std::span<const std::int32_t> points);
   std::vector<double> vector(ConstFieldView field, bool per_volume = false) const;
   std::vector<double> scalar(ConstFieldView field) const;
   std::vector<double> tensor(ConstFieldView field, bool identity = false) const;

@@ -22,10 +22,12 @@ std::string unit(const Parameter& p) {
 }
 
 std::string choices(const Parameter& p) {
+  std::vector<std::string> all = p.choices;
+  if (!p.choice_prefix.empty()) all.push_back(p.choice_prefix + "NAME");
   std::string text;
-  for (std::size_t i = 0; i < p.choices.size(); ++i) {
-    const char* separator = i == 0 ? "" : i + 1 == p.choices.size() ? " or " : ", ";
-    text += fmt::format("{}\"{}\"", separator, p.choices[i]);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const char* separator = i == 0 ? "" : i + 1 == all.size() ? " or " : ", ";
+    text += fmt::format("{}\"{}\"", separator, all[i]);
   }
   return text;
 }

@@ -360,7 +360,7 @@ void RunRecorder::write_frame(const StepReport& report) {
     };
     if (shared) {
       const std::uint64_t begin =
-          told_to_all(first_ ? std::vector{writer_->reserve(name, mine.width)} : std::vector<std::uint64_t>()).front();
+          told_to_all(first_ ? std::vector{writer_->reserve(name, mine.width, mine.unit)} : std::vector<std::uint64_t>()).front();
       share_points(simulation_.problem(), mine.data, width, [&](std::size_t first, std::span<const double> rows) {
         shared->write(begin + first * width * sizeof(double), rows);
         look(first, rows);
@@ -368,7 +368,7 @@ void RunRecorder::write_frame(const StepReport& report) {
       strange = -communicator().largest(-strange);
     } else {
       gather_points(simulation_.problem(), mine.data, width, [&](std::size_t first, std::span<const double> rows) {
-        writer_->add(name, mine.width, rows);
+        writer_->add(name, mine.width, rows, mine.unit);
         look(first, rows);
       });
     }

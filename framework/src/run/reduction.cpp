@@ -41,7 +41,7 @@ std::vector<double> values_of(const HistoryDescription& record, BodyProblem& pro
   const bool density = record.quantity != "reaction";   // a force over the volume of its point
   const Field* const couples = moment && !density ? &fields.reaction_couples() : nullptr;
   const double* const couple = couples ? couples->component(couples->components() == 3 ? record.component[0] - 'x' : 0) : nullptr;
-  const int column = moment ? 0 : PointFields::column(record.quantity, record.component);
+  const int column = moment ? 0 : PointFields::column(field.width, record.component);
   std::vector<double> values;
   for (std::size_t n = 0; n < points.size(); ++n) {
     const double* const row = &field.data[n * width];

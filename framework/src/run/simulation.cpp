@@ -81,7 +81,7 @@ void Simulation::evaluate_conditions() {
 
 void Simulation::refuse_shapes() const {
   const auto check = [&](const std::string& field, const SourcePosition& position, const std::string& key) {
-    if (!find_point_field(field)->of_shapes) return;
+    if (!names_state(field) && !find_point_field(field)->of_shapes) return;
     std::vector<std::string> others;
     for (const PointField& other : point_fields())
       if (!other.of_shapes) others.push_back(other.name);
@@ -220,7 +220,7 @@ std::string Simulation::explanation(const Registry& registry) const {
   if (!traits_.dynamic) notes.push_back({"velocity, mass", "not a dynamic run", fmt::format("{:.3g} MB", static_cast<double>(problem_->points().stride()) * 8e-6 * (2 * problem_->dimension() + 1))});
   if (problem_->constant_stiffness()) notes.push_back({"new estimates of the stable step", "every law has a constant tangent", "one Lanczos run in 500 steps"});
   notes.push_back({"energies", "only summed where history samples", "one psi an evaluation point and step"});
-  const std::size_t fields = point_fields().size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);
+  const std::size_t fields = point_fields().size() + scene_.output.states.size(), written = std::max<std::size_t>(scene_.output.fields.size(), 3);
   notes.push_back({"fields that nobody asked for", "computed when written",
                    fmt::format("{} of {} point fields", fields - std::min(fields, written), fields)});
   std::string text = "skipped:\n";

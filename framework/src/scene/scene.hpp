@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "output_fields/state_field.hpp"
 #include "perikit/core/space.hpp"
 #include "perikit/plugin/parameters.hpp"
 #include "perikit/plugin/part.hpp"
@@ -139,6 +140,7 @@ struct OutputDescription {
   std::vector<std::string> fields;           ///< empty: default
   SourcePosition fields_position;
   std::vector<HistoryDescription> history;
+  std::vector<StateField> states;            ///< what the laws of the scene remember, where fields or history ask for any of it
   std::vector<std::size_t> derived;          ///< those with a value from other columns, each after the ones that it uses
 };
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "output_fields/point_field.hpp"
 #include "scene/scene_reader.hpp"
 #include "scene/sections.hpp"
 #include "scene/toml/toml_text.hpp"
@@ -197,7 +198,54 @@ void SceneReader::read_output(const toml::table& root) {
     reader_.errors.add(values.position("fields"), fmt::format("output.fields.{}", i),
                        fmt::format("found \"{}\" twice; allowed: each field once", description.fields[i]));
   }
+  const toml::array* const fields = output["fields"].as_array();
+  for (std::size_t i = 0; i < description.fields.size(); ++i)
+    check_state(description.fields[i], fields && i < fields->size() ? reader_.position(*fields->get(i)) : values.position("fields"), fmt::format("output.fields.{}", i));
   read_history(output);
+}
+
+const std::vector<StateField>* SceneReader::states() {
+  const auto* const factory = dynamic_cast<const PartFactory*>(&parts_);
+  if (states_found_) return &scene_.output.states;
+  if (!factory || !scene_.material || reader_.dimension == 0 || !reader_.errors.empty()) return nullptr;
+  std::vector<std::shared_ptr<const PartValues>> parts{scene_.material};
+  for (const RegionDescription& region : scene_.regions) parts.push_back(region.material);
+  std::vector<std::unique_ptr<Material>> laws;
+  std::vector<const Material*> all;
+  for (const auto& part : parts) {
+    try {
+      all.push_back(laws.emplace_back(factory->material(*part)).get());
+    } catch (const InputError& error) {
+      reader_.errors.add(part->values.position("type"), error);
+      return nullptr;
+    }
+  }
+  scene_.output.states = state_fields(all, scene_.body.space);
+  states_found_ = true;
+  return &scene_.output.states;
+}
+
+int SceneReader::width_of(const std::string& field) {
+  if (const PointField* const known = find_point_field(field)) return known->width;
+  const std::vector<StateField>* const known = states();
+  if (!known) return 0;
+  const auto found = std::ranges::find(*known, field, &StateField::name);
+  return found == known->end() ? 0 : found->width;
+}
+
+void SceneReader::check_state(const std::string& field, const SourcePosition& position, const std::string& key) {
+  const std::vector<StateField>* const known = names_state(field) ? states() : nullptr;
+  if (!known) return;
+  const auto found = std::ranges::find(*known, field, &StateField::name);
+  if (found != known->end() && found->width > 0) return;
+  std::vector<std::string> names, laws{scene_.material->type};
+  for (const StateField& state : *known)
+    if (state.width > 0) names.push_back(state.name);
+  for (const RegionDescription& region : scene_.regions)
+    if (std::ranges::find(laws, region.material->type) == laws.end()) laws.push_back(region.material->type);
+  const std::string why = found != known->end() ? ", by which two materials of this scene mean different things" : "";
+  const std::string allowed = names.empty() ? fmt::format("fields without state:, as {} remembers nothing", fmt::join(laws, " and ")) : fmt::format("\"{}\"{}", fmt::join(names, "\", \""), did_you_mean(field, names));
+  reader_.errors.add(position, key, fmt::format("found \"{}\"{}; allowed: {}", field, why, allowed));
 }
 
 void SceneReader::read_run(const toml::table& root) {

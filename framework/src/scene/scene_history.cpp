@@ -80,9 +80,11 @@ void SceneReader::read_column(const toml::table& record, const ParameterValues& 
   column.position = values.position("quantity");
   const bool moment = column.reduce == "moment";
   if (values.has("quantity")) {
-    std::vector<std::string> components = find_point_field(column.quantity)->components(reader_.dimension);
+    check_state(column.quantity, column.position, join_path(values.path(), "quantity"));
+    const int width = width_of(column.quantity);
+    std::vector<std::string> components = field_components(width, reader_.dimension);
     if (moment) components = reader_.dimension == 2 ? std::vector<std::string>{"z"} : std::vector<std::string>{"x", "y", "z"};
-    if (components.empty() && values.has("component")) {
+    if (width > 0 && components.empty() && values.has("component")) {
       refuse("component", fmt::format("found \"{}\" of {}, which is a scalar; allowed: no component", column.component, column.quantity));
     } else if (moment && reader_.dimension == 2 && !record.contains("component")) {
       column.component = "z";

@@ -43,6 +43,12 @@ class SceneReader {
   void read_loads(const toml::table& root);
   void read_terms(const toml::table& root);
   void read_output(const toml::table& root);
+  /// What the laws of the scene remember; null where they cannot be made.
+  const std::vector<StateField>* states();
+  /// Numbers in a row of a field; 0: not known, or after an error.
+  int width_of(const std::string& field);
+  /// An error where no law of the scene remembers the variable that `field` names, and nothing of other fields.
+  void check_state(const std::string& field, const SourcePosition& position, const std::string& key);
   void read_history(const toml::table& output);
   void read_column(const toml::table& record, const ParameterValues& values, HistoryDescription& column);
   void read_derived(const std::vector<ParameterValues>& columns);
@@ -73,6 +79,7 @@ class SceneReader {
   ResolvedWriter writer_;
   Scene scene_;
   std::vector<std::string> set_names_;
+  bool states_found_ = false;
   bool trust_;
 };
 

@@ -1,6 +1,7 @@
 #include "scene/sections.hpp"
 
 #include "output_fields/point_field.hpp"
+#include "output_fields/state_field.hpp"
 #include "perikit/core/warnings.hpp"
 #include "scene/scene.hpp"
 
@@ -209,12 +210,11 @@ ParameterTable output_parameters() {
       .length(1, unbounded);
   table.integer("history_every", "Steps between samples; 0: as the integrator suggests.").at_least(0).by_default("0");
   table.integer("checkpoint_every", "Steps between checkpoints; 0: none.").at_least(0).by_default("0");
-  table
-      .add(ParameterType::texts, "fields", "-",
-           "Point fields of the frames; without it displacement, velocity (dynamic runs), strain_energy_density and damage (if "
-           "any).")
-      .length(1, unbounded)
-      .choices = point_field_names();
+  Parameter& fields = table.add(ParameterType::texts, "fields", "-",
+                                "Point fields of the frames; without it displacement, velocity (dynamic runs), strain_energy_density and damage (if "
+                                "any). state:NAME: what a material of the scene remembers (`perikit describe`).");
+  fields.length(1, unbounded).choices = point_field_names();
+  fields.choice_prefix = state_prefix;
   table.at_most_of(1, {"frames", "every", "times"});
   return table;
 }
@@ -223,7 +223,7 @@ ParameterTable history_parameters() {
   ParameterTable table;
   table.string("name", "Name of the column.").require();
   table.string("set", "The points that are sampled.").by_default("\"all\"");
-  table.choice("quantity", point_field_names(), "A point field.");
+  table.choice("quantity", point_field_names(), "A point field.").choice_prefix = state_prefix;
   table.string("value", "In place of a quantity: an expression of other columns of the same row, of t and of [constants], such as \"stress/strain\".");
   table.string("component", "Component of a vector (x) or tensor (xy); with reduce = \"moment\" of the moment, in 2D z, which may be left out.");
   table

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "assembly/bond_assembly.hpp"
 #include "assembly/element_assembly.hpp"
@@ -96,6 +97,50 @@ std::vector<HistoryPlace> Mechanics::history_points() {
   }
   std::ranges::sort(all, {}, &HistoryPlace::point);
   return all;
+}
+
+void Mechanics::average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) {
+  with_dimension(parts_.families.body().dimension(), [&](auto d) { average_state<d>(name, components, points, to); });
+}
+
+template <int D>
+void Mechanics::average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) const {
+  constexpr std::size_t nowhere = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> first;   // of the variable among the components of each law
+  for (const MaterialRecord& record : parts_.laws.records()) {
+    std::size_t at = 0, found = nowhere;
+    for (const StateVariable& variable : record.material->state(parts_.laws.space())) {
+      if (variable.name == name) found = at;
+      at += static_cast<std::size_t>(variable.components);
+    }
+    first.push_back(found);
+  }
+  std::ranges::fill(to, 0.0);
+  PerThread<EvaluationPoints<D>> readers;
+  readers.prepare([&] { return std::make_unique<EvaluationPoints<D>>(parts_); });
+  parallel_for(points.size(), [&](std::size_t k) {
+    const auto p = static_cast<std::size_t>(points[k]);
+    const std::size_t offset = first[parts_.laws.id_of(p)];
+    if (offset == nowhere || !space_->evaluates(p)) return;
+    EvaluationPoints<D>& reader = readers.mine();
+    const std::span<double> sum = to.subspan(k * components, components);
+    double total = 0;
+    const auto add = [&](double weight, std::int64_t state) {
+      total += weight;
+      for (std::size_t c = 0; c < components; ++c) sum[c] += weight * points_->begin()[(offset + c) * points_->stride() + static_cast<std::size_t>(state)];
+    };
+    if (!reader.at_bonds() && reader.points() == 1) {   // its own, with or without bonds
+      if (const std::int64_t state = space_->number_of(points[k], -1, 0).state; state >= 0) add(1, state);
+      return;
+    }
+    reader.read(p);
+    for (int q = 0; q < reader.points(); ++q) {
+      const double weight = reader.weight(q);
+      if (weight == 0) continue;
+      if (const std::int64_t state = space_->number_of(points[k], reader.far(q), q).state; state >= 0) add(weight, state);
+    }
+    for (std::size_t c = 0; c < components && total != 0; ++c) sum[c] /= total;
+  });
 }
 
 void Mechanics::find_laminates(GroupMarks marks, bool again) {

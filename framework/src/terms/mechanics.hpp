@@ -34,6 +34,7 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   MaterialPoints& points() noexcept override { return *points_; }
   void history_restored() override { space_->history_restored(); }
   std::vector<HistoryPlace> history_points() override;
+  void average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) override;
   bool dissipates() const noexcept override { return parts_.laws.dissipates(); }
 
   /// A constant stress is in equilibrium from now on, where the body is whole.
@@ -47,6 +48,8 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   void find_laminates(GroupMarks marks, bool again);
   template <int D>
   std::vector<HistoryPlace> history_points();
+  template <int D>
+  void average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) const;
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;

@@ -132,6 +132,9 @@ class StatefulTerm {
   virtual void history_restored() = 0;
   /// Its evaluation points here, ascending. Failed bonds have none.
   virtual std::vector<HistoryPlace> history_points() = 0;
+  /// to[k * components + c] <- component c of the variable of this name at points[k], averaged over the evaluation points that belong to the point by their weights; 0 where
+  /// the law of the point has none, or no bond is left. Laws that have it give it so many components.
+  virtual void average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) = 0;
   /// Energies that are dissipated in a step come with its forces.
   virtual bool dissipates() const noexcept = 0;
 };

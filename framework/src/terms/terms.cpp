@@ -324,6 +324,11 @@ void Terms::history_restored() {
 
 std::vector<HistoryPlace> Terms::history_points() const { return stateful() ? stateful()->history_points() : std::vector<HistoryPlace>(); }
 
+void Terms::average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) const {
+  if (stateful()) stateful()->average_state(name, components, points, to);
+  else std::ranges::fill(to, 0.0);
+}
+
 const Body& Terms::body() const noexcept { return parts_.families->body(); }
 
 bool Terms::constant_tangent() const noexcept {

@@ -104,6 +104,8 @@ class Terms {
   void history_restored();
   /// Its evaluation points, ascending. Failed bonds have none.
   std::vector<HistoryPlace> history_points() const;
+  /// What laws remember, at points: see StatefulTerm. 0 where nothing does.
+  void average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) const;
   /// The step that the last evaluation of forces ended is done, or given up: see Problem. What laws dissipated in it, over all ranks [J].
   double accept();
   void revert();

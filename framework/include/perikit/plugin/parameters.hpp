@@ -55,6 +55,7 @@ struct Parameter {
   double upper = std::numeric_limits<double>::infinity();
   bool lower_open = false, upper_open = false;
   std::vector<std::string> choices;
+  std::string choice_prefix{};         ///< beside the choices: every text that begins with this; empty: none
   std::size_t min_length = 0, max_length = std::numeric_limits<std::size_t>::max();
   bool time = false;                   ///< expressions may use t
   bool per_point = false;              ///< material parameter that may vary in space; evaluated at set-up

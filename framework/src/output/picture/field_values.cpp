@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "output_fields/point_field.hpp"
+#include "output_fields/state_field.hpp"
 #include "perikit/core/errors.hpp"
 
 namespace perikit {
@@ -48,7 +49,7 @@ FieldValues field_values(const std::string& field, int width, std::span<const do
   if (const PointField* known = find_point_field(field)) {
     result.label = known->label;
   } else {
-    result.label = field;
+    result.label = names_state(field) ? std::string(variable_of(field)) : field;
     std::ranges::replace(result.label, '_', ' ');
   }
   if (width == 1) {

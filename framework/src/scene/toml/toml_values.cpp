@@ -99,10 +99,11 @@ void TomlReader::refuse_number(const Parameter& parameter, const toml::node& nod
 
 std::optional<std::string> TomlReader::text(const Parameter& parameter, const toml::node& node, const std::string& path) {
   const auto& choices = parameter.choices;
-  if (const auto* v = node.as_string();
-      v && (choices.empty() || std::find(choices.begin(), choices.end(), v->get()) != choices.end())) {
-    return v->get();
-  }
+  const auto chosen = [&](const std::string& text) {
+    const std::string& prefix = parameter.choice_prefix;
+    return choices.empty() || std::ranges::find(choices, text) != choices.end() || (!prefix.empty() && text.starts_with(prefix));
+  };
+  if (const auto* v = node.as_string(); v && chosen(v->get())) return v->get();
   refuse_value(parameter, node, path);
   return std::nullopt;
 }
