@@ -49,7 +49,9 @@ class Stepper final : private PointMotion {
   void evaluate(double* energy, double dt) {
     const Configuration at(u_, state_.time, dt, v_);
     const EvaluationStatus status = problem_.evaluate_forces(pending() ? at.moving(*this) : at, force_, energy);
-    if (!status.ok()) throw RunError(fmt::format("step {}, time {:.6g} s: {}", state_.step, state_.time, status.description));
+    if (!status.ok())
+      throw RunError(fmt::format("step {}, time {:.6g} s: {}{}", state_.step, state_.time, status.description,
+                                 status.step_factor < 1 ? "; verlet takes no step again: a shorter time_step, or a smaller safety, may do" : ""));
   }
 
   /// target = v + dt a with v at half steps, on all points.

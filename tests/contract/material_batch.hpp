@@ -110,17 +110,17 @@ inline Values random_direction(Random& random, Space space) {
 }
 
 /// All outputs of one call of evaluate for points H_p with directions dH_p, from histories (empty: fresh). Outputs hold NaN before; entries behind padded(n) are
-/// guarded and must not change.
+/// guarded and must not change. outside: variables from outside, of all points or of each; empty: their reference values.
 struct Evaluation {
   int n, components;
   std::size_t stride;
-  Field H, dH, psi, P, dP, A, lateral, dissipated, constant_field, state_old, state;
+  Field H, dH, psi, P, dP, A, lateral, dissipated, step_factor, constant_field, external, state_old, state;
   Status status;
   bool guards_intact = true;
 
   Evaluation(const Material& material, Space space, std::span<const double> constants, const std::vector<Values>& points,
              const std::vector<Values>& directions = {}, bool constants_per_point = false,
-             const std::vector<Values>& histories = {}, bool confined = false, double time_step = 0)
+             const std::vector<Values>& histories = {}, bool confined = false, double time_step = 0, const std::vector<Values>& outside = {})
       : n(static_cast<int>(points.size())),
         components(tensor_components(space)),
         stride(padded(points.size()) + padding),
@@ -132,7 +132,9 @@ struct Evaluation {
         A(components * components, stride),
         lateral(1, stride),
         dissipated(1, stride),
+        step_factor(1, stride),
         constant_field(static_cast<int>(constants.size()), stride),
+        external(static_cast<int>(outside.empty() ? 0 : outside.front().size()), stride),
         state_old(material.state_components(space), stride + padding),
         state(material.state_components(space), stride + padding) {
     for (int p = 0; p < n; ++p)
@@ -142,9 +144,12 @@ struct Evaluation {
       }
     for (std::size_t p = 0; p < histories.size(); ++p)
       for (int c = 0; c < state_old.components(); ++c) state_old.component(c)[p] = histories[p][c];
+    // One for all comes without a stride.
+    for (std::size_t p = 0; p < outside.size(); ++p)
+      for (int k = 0; k < external.components(); ++k) (outside.size() == 1 ? external.data()[k] : external.component(k)[p]) = outside[p][static_cast<std::size_t>(k)];
     for (std::size_t k = 0; k < constants.size(); ++k)
       for (std::size_t p = 0; p < stride; ++p) constant_field.component(static_cast<int>(k))[p] = constants[k];
-    for (Field* f : {&psi, &P, &dP, &A, &lateral, &dissipated, &state}) f->fill(std::numeric_limits<double>::quiet_NaN());
+    for (Field* f : {&psi, &P, &dP, &A, &lateral, &dissipated, &step_factor, &state}) f->fill(std::numeric_limits<double>::quiet_NaN());
     status = material.evaluate(space, {.n = n,
                                        .stride = stride,
                                        .confined = confined,
@@ -153,6 +158,8 @@ struct Evaluation {
                                        .dH = dH.data(),
                                        .constants = constants_per_point ? constant_field.data() : constants.data(),
                                        .constant_stride = constants_per_point ? stride : 0,
+                                       .external = outside.empty() ? nullptr : external.data(),
+                                       .external_stride = outside.size() > 1 ? stride : 0,
                                        .state_old = histories.empty() ? nullptr : state_old.data(),
                                        .state_new = state.components() > 0 ? state.data() : nullptr,
                                        .state_stride = state.stride(),
@@ -161,9 +168,11 @@ struct Evaluation {
                                        .dP = dP.data(),
                                        .lateral = free_stretch(space) ? lateral.data() : nullptr,
                                        .A = confined ? nullptr : A.data(),
-                                       .dissipated = material.traits().dissipates ? dissipated.data() : nullptr});
+                                       .dissipated = material.traits().dissipates ? dissipated.data() : nullptr,
+                                       .step_factor = material.traits().limits_step ? step_factor.data() : nullptr});
     if (!material.traits().dissipates) std::fill_n(dissipated.data(), padded(points.size()), 0.0);
-    for (Field* f : {&psi, &P, &dP, &A, &lateral, &dissipated, &state})
+    if (!material.traits().limits_step) std::fill_n(step_factor.data(), padded(points.size()), 1.0);
+    for (Field* f : {&psi, &P, &dP, &A, &lateral, &dissipated, &step_factor, &state})
       for (int c = 0; c < f->components(); ++c)
         for (std::size_t p = padded(points.size()); p < f->stride(); ++p) guards_intact &= std::isnan(f->component(c)[p]);
   }

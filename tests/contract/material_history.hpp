@@ -80,6 +80,10 @@ class HistoryContract : MaterialCheck {
                   const std::vector<Values>& directions = {}, double time_step = 0) const {
     Evaluation e(material_, space_, constants_, H, directions, false, from, false, time_step);
     CHECK_MESSAGE(e.status.ok(), label(), "admissible step refused, point ", e.status.inadmissible);
+    for (int p = 0; p < e.n; ++p) {
+      const double factor = e.step_factor.data()[p];
+      CHECK_MESSAGE((factor > 0 && std::isfinite(factor)), label(), "the law asks for a step of ", factor, " of the length that it had; a share is above 0");
+    }
     return e;
   }
   /// The end of a path in equal steps.
@@ -183,6 +187,7 @@ class HistoryContract : MaterialCheck {
       const Evaluation single = step({H[p]}, {from[p]});
       same_bits("batch = single from a history", batch.all(p), single.all(0));
       same_bits("history of batch = single", history, single.at(single.state, 0));
+      same_bits("step factor of batch = single", batch.at(batch.step_factor, p), single.at(single.step_factor, 0));
     }
     std::vector<Values> zero(points_, Values(from.front().size(), 0.0));
     const Evaluation fresh = step(H, {}), zeros = step(H, zero);

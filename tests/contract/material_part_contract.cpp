@@ -121,6 +121,36 @@ TEST_CASE("material: what a law remembers has names, units and shapes that field
   }
 }
 
+TEST_CASE("material: variables from outside have names and units, and are those of each point") {
+  for_every_example([](const Material& material, const std::vector<double>& constants, const MaterialOptions& options) {
+    const std::span<const ExternalVariable> variables = material.external();
+    if (variables.empty()) return;
+    INFO(options.law);
+    Values reference, other;
+    for (const ExternalVariable& variable : variables) {
+      CHECK_MESSAGE((!variable.name.empty() && !variable.unit.empty() && std::isfinite(variable.reference)), "a variable from outside needs a name, a unit (\"-\") and a finite reference value");
+      reference.push_back(variable.reference);
+      other.push_back(1.1 * variable.reference + 0.1);
+    }
+    for (const Space space : {Space::solid, Space::plane_strain, Space::plane_stress, Space::line_strain, Space::line_stress}) {
+      Random random(20);
+      std::vector<Values> points, directions;
+      for (int p = 0; p < 5; ++p) {
+        points.push_back(random_direction(random, space));
+        for (double& h : points.back()) h *= 0.02;
+        directions.push_back(random_direction(random, space));
+      }
+      const auto evaluate = [&](const std::vector<Values>& outside) { return Evaluation(material, space, constants, points, directions, false, {}, false, 0, outside); };
+      const Evaluation none = evaluate({}), given = evaluate({reference}), elsewhere = evaluate({other}), mixed = evaluate({reference, other, reference, other, other});
+      for (int p = 0; p < 5; ++p) {
+        CHECK_MESSAGE(given.all(p) == none.all(p), "the reference values are those that it has where none are given");
+        CHECK_MESSAGE(mixed.all(p) == (p == 1 || p > 2 ? elsewhere : given).all(p), "each point has its own values, point ", p);
+      }
+      CHECK_MESSAGE(elsewhere.all(0) != given.all(0), "no variable from outside changes anything");
+    }
+  });
+}
+
 TEST_CASE("material: constants are complete, finite and repeatable, and the small-strain moduli are stable") {
   for (const Example& example : examples(Kind::material)) {
     INFO(label(example));

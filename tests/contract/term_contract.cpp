@@ -14,8 +14,9 @@
 #include "perikit/sdk/stable_step.hpp"
 #include "setup/point_terms.hpp"
 #include "tests/contract/fixture.hpp"
-#include "tests/kit/matrices.hpp"
 #include "tests/contract/integrator_fixture.hpp"
+#include "tests/kit/derivative.hpp"
+#include "tests/kit/matrices.hpp"
 #include "thread_ranks.hpp"
 
 using namespace perikit;
@@ -147,12 +148,6 @@ LawPoints moved(const LawPoints& points, double h) {
   return other;
 }
 
-/// The derivative of value(h) at 0, of fourth order.
-template <class Value>
-double slope(Value&& value, double h) {
-  return (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h);
-}
-
 double largest_of(const AlignedVector<double>& values, const LawPoints& points) {
   double most = 0;
   for (std::size_t c = 0; c < values.size() / points.stride(); ++c)
@@ -197,12 +192,12 @@ TEST_CASE("term: force = -de/du where it is conservative, tangent = df/du") {
     const double scale = std::max({largest_of(out.force, points), largest_of(out.dforce, points), largest_of(out.energy, points)});
     for (std::size_t p = 0; p < points.points(); ++p) {
       if (points.traits.conservative) {
-        const double change = slope([&](double s) { return at.at(s).energy[p]; }, h), work = points.product(out.force, points.w, p);
+        const double change = test::slope_of([&](double s) { return at.at(s).energy[p]; }, h), work = points.product(out.force, points.w, p);
         CHECK_MESSAGE(std::abs(change + work) <= tolerance * scale, "de (differences): ", change, ", -f . w ", -work);
       }
       for (std::size_t c = 0; c < static_cast<std::size_t>(d); ++c) {
         const std::size_t k = c * points.stride() + p;
-        const double change = slope([&](double s) { return at.at(s).force[k]; }, h);
+        const double change = test::slope_of([&](double s) { return at.at(s).force[k]; }, h);
         CHECK_MESSAGE(std::abs(change - out.dforce[k]) <= tolerance * scale, "df (differences): ", change, ", df/du . w ", out.dforce[k]);
       }
     }
@@ -273,7 +268,7 @@ TEST_CASE("term: traits are true") {
       for (const double s : {-2 * h, -h, h, 2 * h}) at[s] = moved(along, s).evaluate();
       const double scale = largest_of(out.force, points) + largest_of(out.energy, points);
       for (std::size_t p = 0; p < points.points(); ++p) {
-        const double left = slope([&](double s) { return at.at(s).energy[p]; }, h) + points.product(out.force, points.v, p);
+        const double left = test::slope_of([&](double s) { return at.at(s).energy[p]; }, h) + points.product(out.force, points.v, p);
         CHECK_MESSAGE(left <= 1e-7 * scale, "traits.dissipates: a motion gains ", left, " W/m^3");
       }
     }

@@ -4,6 +4,7 @@
 
 #include "perikit/core/tensor.hpp"
 #include "perikit/kinematics.hpp"
+#include "perikit/model/elastic_constants.hpp"
 #include "perikit/sdk/law_material.hpp"
 #include "perikit/sdk/law_term.hpp"
 
@@ -51,6 +52,84 @@ struct TextbookRubber {
     return k[0] * i + 0.1 * k[0] * i * i + 0.01 * k[0] * i * i * i + 0.5 * k[1] * (J - 1.0) * (J - 1.0);
   }
 };
+
+/// An elastic law that counts its steps, and takes none in which its strain changes by more than it is made for.
+struct Careful {
+  static constexpr MaterialTraits traits{.constants = 3, .hyperelastic = false, .limits_step = true};
+  template <class S>
+  static constexpr std::array state{StateVariable{"strain", "-", symmetric_size<S>}, StateVariable{"steps", "-", 1}};
+  template <class S>
+  static constexpr int size = components_of(state<S>);
+
+  void constants(const MaterialInput& input, double* k) const {
+    const Moduli moduli = elastic_constants(input);
+    k[0] = moduli.lambda;
+    k[1] = moduli.mu;
+    k[2] = input.value("largest_change");
+  }
+  Moduli small_strain(const double* k) const noexcept { return {k[0], k[1]}; }
+
+  template <class T, class S>
+  struct Step {
+    std::array<T, size<S>> begin;
+
+    template <class K>
+    HistoryUpdate<T, S, size<S>> update(const Tensor<T, S>& H, const K& k) const noexcept {
+      const Tensor<T, S> E = 0.5 * right_cauchy_green_minus_identity(H), change = E - unpack_symmetric<S>(begin.data());
+      HistoryUpdate<T, S, size<S>> end;
+      end.psi = 0.5 * k[0] * (trace(E) * trace(E)) + k[1] * inner(E, E);
+      end.P = P(H, k);
+      const T size_of_change = sqrt(inner(change, change));
+      end.step_factor = select(size_of_change > k[2], k[2] / size_of_change, T(1.0));
+      pack_symmetric(E, end.state.data());
+      end.state.back() = begin.back() + 1.0;
+      return end;
+    }
+    template <class U, class K>
+    Tensor<U, S> P(const Tensor<U, S>& H, const K& k) const noexcept {
+      const Tensor<U, S> E = U(0.5) * right_cauchy_green_minus_identity(H), second = add_diagonal(U(2.0 * k[1]) * E, k[0] * trace(E));
+      return second + H * second;
+    }
+  };
+  template <class S, class T>
+  Step<T, S> after(const std::array<T, size<S>>& begin) const noexcept {
+    return {begin};
+  }
+};
+
+void add_careful(Registrar& registrar) {
+  ParameterTable table = elastic_parameters();
+  table.material("largest_change", "-", "Norm of the change of strain in a step.").by_default("0.5").positive();
+  registrar.material({.name = "their_careful", .summary = "their_careful", .parameters = std::move(table), .examples = {"density = 1000.0\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.3"}},
+                     [](const ParameterValues&, const PartFactory&) { return std::make_unique<LawMaterial<Careful>>(); });
+}
+
+/// A solid that grows with its temperature.
+struct Warm {
+  static constexpr MaterialTraits traits{.constants = 3};
+  static constexpr std::array external{ExternalVariable{"temperature", "K", 300.0}};
+
+  void constants(const MaterialInput& input, double* k) const {
+    const Moduli moduli = elastic_constants(input);
+    k[0] = moduli.lambda;
+    k[1] = moduli.mu;
+    k[2] = input.value("expansion");
+  }
+  Moduli small_strain(const double* k) const noexcept { return {k[0], k[1]}; }
+  template <class T, class S, class K>
+  T psi(const Tensor<T, S>& H, const K& k) const noexcept {
+    const Tensor<T, S> E = T(0.5) * right_cauchy_green_minus_identity(H);
+    const T grown = trace(E);
+    return 0.5 * k[0] * (grown * grown) + k[1] * inner(E, E) - (3.0 * k[0] + 2.0 * k[1]) * k[2] * (k[3] - external[0].reference) * grown;
+  }
+};
+
+void add_warm(Registrar& registrar) {
+  ParameterTable table = elastic_parameters();
+  table.material("expansion", "1/K", "Strain by temperature.").by_default("1e-5").at_least(0);
+  registrar.material({.name = "their_warm", .summary = "their_warm", .parameters = std::move(table), .examples = {"density = 1000.0\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.3"}},
+                     [](const ParameterValues&, const PartFactory&) { return std::make_unique<LawMaterial<Warm>>(); });
+}
 
 template <class Law>
 void add_rubber(Registrar& registrar, const char* name) {
@@ -168,6 +247,8 @@ PERIKIT_PLUGIN(registrar) {
   add<Bonds>(registrar, "their_bonds");
   add<Blend>(registrar, "their_blend");
   add_rubber<TextbookRubber>(registrar, "their_rubber");
+  add_careful(registrar);
+  add_warm(registrar);
   add_term<Drag>(registrar, "their_drag");
   add_term<Swirl>(registrar, "their_swirl");
   add<Domains>(registrar, "their_domains");

@@ -6,22 +6,13 @@
 #include <cmath>
 #include <vector>
 
-#include "plugin/registry.hpp"
 #include "run/simulation.hpp"
+#include "tests/kit/third_party.hpp"
 
 using namespace perikit;
+using perikit::test::with_third_parties;
 
 namespace {
-
-/// With the terms of third parties.
-Registry& parts() {
-  static Registry registry;
-  if (registry.names(Kind::term).empty()) {
-    registry.add_folder(PERIKIT_PLUGIN_FOLDER);
-    registry.open(std::string(PERIKIT_TEST_PLUGIN_FOLDER) + "/third_party/third_party.so");
-  }
-  return registry;
-}
 
 std::string plate(const std::string& further, const std::string& integrator) {
   return "format = 1\n[constants]\nk = 0.5\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 1\nlower = [0, 0]\nupper = [9, 7]\n[sets]\nleft = \"x < 4\"\n"
@@ -36,7 +27,7 @@ struct Nobody : Observer {
 };
 
 std::unique_ptr<Simulation> done(const std::string& scene) {
-  auto simulation = std::make_unique<Simulation>(parse_scene(scene, "plate.toml", parts()), parts());
+  auto simulation = std::make_unique<Simulation>(parse_scene(scene, "plate.toml", with_third_parties()), with_third_parties());
   Nobody nobody;
   simulation->run(nobody);
   return simulation;
@@ -44,7 +35,7 @@ std::unique_ptr<Simulation> done(const std::string& scene) {
 
 std::string refusal(const std::string& scene) {
   try {
-    Simulation(parse_scene(scene, "plate.toml", parts()), parts());
+    Simulation(parse_scene(scene, "plate.toml", with_third_parties()), with_third_parties());
   } catch (const std::exception& error) {
     return error.what();
   }
@@ -121,7 +112,7 @@ TEST_CASE("term: constants of stiffness are known") {
     const std::string linear = "[material]\ntype = \"linear_elastic\"\n";
     std::string scene = plate(term, "type = \"verlet\"\nend_time = 1.0");
     scene.replace(scene.find("[material]\ntype = \"saint_venant_kirchhoff\"\n"), std::string("[material]\ntype = \"saint_venant_kirchhoff\"\n").size(), linear);
-    return Simulation(parse_scene(scene, "plate.toml", parts()), parts()).problem().constant_stiffness();
+    return Simulation(parse_scene(scene, "plate.toml", with_third_parties()), with_third_parties()).problem().constant_stiffness();
   };
   CHECK(constant(""));
   CHECK(constant("[[term]]\ntype = \"foundation\"\nstiffness = \"1 + x\"\n"));
@@ -153,8 +144,8 @@ TEST_CASE("term: an equilibrium under forces without energy, whose work comes fr
   Simulation simulation(parse_scene(plate("[[term]]\ntype = \"foundation\"\nstiffness = 2\n[[term]]\ntype = \"their_swirl\"\ncoefficient = 0.5\n"
                                           "[[load]]\nset = \"all\"\nbody_force = [0.1, 0]",
                                           "type = \"newton\"\nsteps = 16"),
-                                    "plate.toml", parts()),
-                        parts());
+                                    "plate.toml", with_third_parties()),
+                        with_third_parties());
   struct First final : Nobody {
     explicit First(const State& state) : state(state) {}
     void step_done(const StepReport& report) override {

@@ -188,7 +188,7 @@ std::int64_t BondAssembly<D>::add_bonds(std::size_t first, std::size_t last, con
   m.bond_of_lane.clear();
   m.row_of_lane.clear();
   const auto finish = [&]() -> std::int64_t {
-    const int bad = m.batch.evaluate(at.time_step(), convex);
+    const int bad = m.batch.evaluate(at, convex);
     if (bad >= 0) return m.batch.owner(bad);
     for (int lane = 0; lane < m.batch.lanes(); ++lane) {
       const auto l = static_cast<std::size_t>(lane);

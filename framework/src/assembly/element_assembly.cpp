@@ -67,7 +67,7 @@ std::int64_t ElementAssembly<D>::fill_rows(std::size_t first, std::size_t last, 
     m.of_row.push_back(rows_.whole(r) ? &*whole_ : &own);
     add_lanes(r, *m.of_row.back(), at.u(), m);
   }
-  const int bad = m.batch.evaluate(at.time_step(), K.convex);
+  const int bad = m.batch.evaluate(at, K.convex);
   if (bad >= 0) return m.batch.owner(bad);
   int lane = 0;
   for (std::size_t r = first; r < last; ++r) {

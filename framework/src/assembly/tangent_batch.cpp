@@ -30,6 +30,7 @@ int TangentBatch<D>::add(std::size_t owner, std::int32_t far, int part, double w
   if (static_cast<std::size_t>(lane) == owner_.size()) {
     const std::size_t size = owner_.size() + batch_points;
     owner_.resize(size);
+    far_.resize(size, -1);
     weight_.resize(size);
     share_.resize(size);
     if (points_.remember()) number_.resize(size);
@@ -43,6 +44,7 @@ int TangentBatch<D>::add(std::size_t owner, std::int32_t far, int part, double w
     }
   }
   owner_[static_cast<std::size_t>(lane)] = static_cast<std::int32_t>(owner);
+  far_[static_cast<std::size_t>(lane)] = far;
   weight_[static_cast<std::size_t>(lane)] = weight;
   share_[static_cast<std::size_t>(lane)] = share;
   if (!points_.remember() && !of_.laminates) return lane;
@@ -53,7 +55,7 @@ int TangentBatch<D>::add(std::size_t owner, std::int32_t far, int part, double w
 }
 
 template <int D>
-int TangentBatch<D>::evaluate(double time_step, bool convex) {
+int TangentBatch<D>::evaluate(const Configuration& at, bool convex) {
   for (int first = 0; first < lanes_; first += batch_points) {
     const int n = std::min(batch_points, lanes_ - first), last = first + static_cast<int>(padded(static_cast<std::size_t>(n)));
     for (int lane = first + n; lane < last; ++lane) {  // padding at rest
@@ -63,7 +65,7 @@ int TangentBatch<D>::evaluate(double time_step, bool convex) {
         if (selective_) owner_H(lane, c) = 0;
       }
     }
-    const int bad = selective_ ? evaluate_selective(first, n, time_step) : evaluate_plain(first, n, time_step);
+    const int bad = selective_ ? evaluate_selective(first, n, at) : evaluate_plain(first, n, at);
     if (bad >= 0) return first + bad;
   }
   for (int lane = 0; convex && lane < lanes_; ++lane) remove_negative_curvature(lane);
@@ -94,20 +96,21 @@ void TangentBatch<D>::remove_negative_curvature(int lane) {
 }
 
 template <int D>
-LawBatch TangentBatch<D>::batch_of(int first, int n, double time_step) {
+LawBatch TangentBatch<D>::batch_of(int first, int n, const Configuration& at) {
   LawBatch batch;
   batch.n = n;
   batch.points = owner_.data() + first;
   batch.A = A_.data();
+  batch.external = {at.external(), owner_.data() + first, far_.data() + first};
   if (!points_.remember()) return batch;
   points_.gather({number_.data() + first, static_cast<std::size_t>(n)}, state_.data());
-  batch.state = {state_.data(), nullptr, batch_points, time_step};
+  batch.state = {state_.data(), nullptr, batch_points, at.time_step()};
   return batch;
 }
 
 template <int D>
-int TangentBatch<D>::evaluate_plain(int first, int n, double time_step) {
-  LawBatch batch = batch_of(first, n, time_step);
+int TangentBatch<D>::evaluate_plain(int first, int n, const Configuration& at) {
+  LawBatch batch = batch_of(first, n, at);
   batch.H = &H(first, 0);
   const Status status = laws_.evaluate(batch, scratch_);
   if (!status.ok()) return status.inadmissible;
@@ -147,13 +150,13 @@ int TangentBatch<D>::evaluate_laminates(int first, int n, const double* H) {
 }
 
 template <int D>
-int TangentBatch<D>::evaluate_selective(int first, int n, double time_step) {
+int TangentBatch<D>::evaluate_selective(int first, int n, const Configuration& at) {
   const int lanes = static_cast<int>(padded(static_cast<std::size_t>(n)));
   owner_volume(laws_.space(), {lanes, batch_points, &owner_H(first, 0), nullptr}, volume_.data(), batch_points);
   std::copy_n(share_.data() + first, lanes, volume_.data() + volume_share * batch_points);
   const OwnerVolumes owners{volume_.data(), batch_points, volume_group_.data(), false};
   selective_map(laws_.space(), {lanes, 1, &H(first, 0), nullptr, owners, inverse_.data(), growth_.data()}, mapped_.data(), nullptr);
-  LawBatch batch = batch_of(first, n, time_step);
+  LawBatch batch = batch_of(first, n, at);
   batch.H = mapped_.data();
   batch.P = P_.data();
   const Status status = laws_.evaluate(batch, scratch_);

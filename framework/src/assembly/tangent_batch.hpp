@@ -6,6 +6,7 @@
 
 #include "operators/laminates.hpp"
 #include "operators/material_points.hpp"
+#include "perikit/model/configuration.hpp"
 #include "spaces/evaluation_space.hpp"
 
 namespace perikit {
@@ -36,9 +37,9 @@ class TangentBatch {
   /// Component aD + e of Ht, and of the owner's Hbar (selective map only).
   double& H(int lane, int component) noexcept { return at(H_, lane, component); }
   double& owner_H(int lane, int component) noexcept { return at(Hbar_, lane, component); }
-  /// Returns the first inadmissible lane or -1. time_step: of the step that ends at the gradients [s]. convex: the matrices of each lane together lose
+  /// Returns the first inadmissible lane or -1. at: what laws know beside the gradients, the length of the step that ends there and variables from outside. convex: the matrices of each lane together lose
   /// their negative eigenvalues.
-  int evaluate(double time_step, bool convex = false);
+  int evaluate(const Configuration& at, bool convex = false);
   /// Selective map, of no more than batch_points lanes: W times the volume stiffness at the mapped gradient (operators/volume_stiffness.hpp).
   double volume_stiffness(int lane) const noexcept;
   int owner(int lane) const noexcept { return owner_[static_cast<std::size_t>(lane)]; }
@@ -54,10 +55,10 @@ class TangentBatch {
   double& at(AlignedVector<double>& x, int lane, int component) noexcept {
     return x[static_cast<std::size_t>((lane / batch_points * stored + component) * batch_points + lane % batch_points)];
   }
-  int evaluate_plain(int first, int n, double time_step);
-  int evaluate_selective(int first, int n, double time_step);
+  int evaluate_plain(int first, int n, const Configuration& at);
+  int evaluate_selective(int first, int n, const Configuration& at);
   /// Of the laws of these lanes, without what goes in and comes out.
-  LawBatch batch_of(int first, int n, double time_step);
+  LawBatch batch_of(int first, int n, const Configuration& at);
   int evaluate_laminates(int first, int n, const double* H);
   void remove_negative_curvature(int lane);
 
@@ -67,7 +68,7 @@ class TangentBatch {
   bool selective_;
   int lanes_ = 0;
   AlignedVector<double> H_, Hbar_;   ///< batches of [component][batch_points]
-  std::vector<std::int32_t> owner_;  ///< padded to batches
+  std::vector<std::int32_t> owner_, far_;  ///< padded to batches; far: -1 where a lane belongs to its owner alone
   std::vector<double> weight_, share_;   ///< by lane
   std::vector<std::int64_t> number_;     ///< likewise, where something is remembered
   AlignedVector<double> state_;          ///< of a batch

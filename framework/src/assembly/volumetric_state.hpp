@@ -137,7 +137,7 @@ class VolumetricState : public VolumetricRows {
     m.points.read(p);
     double sum = 0;
     const auto finish = [&] {
-      if (m.lanes.evaluate(0) >= 0) return false;
+      if (m.lanes.evaluate({u, 0}) >= 0) return false;
       for (int lane = 0; lane < m.lanes.lanes(); ++lane) sum += m.lanes.volume_stiffness(lane);
       m.lanes.clear();
       return true;

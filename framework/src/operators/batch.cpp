@@ -50,6 +50,16 @@ void BatchWork::end_state(int n, BatchScratch& s, std::int64_t numbers) const no
     }
 }
 
+void BatchWork::ask_for_steps(int first, int n, const double* weight, const BatchScratch& s, std::int64_t numbers) const {
+  for (int l = 0; l < n; ++l) {
+    if (!(s.step_factor[first + l] < 1) || weight[l] == 0) continue;
+    const std::int64_t q = s.first_number >= 0 ? s.first_number + first + l : s.number[first + l];
+    bool at_rest = true;
+    for (int c = 0; c < laws_.components(); ++c) at_rest = at_rest && s.H[c * batch_points + first + l] == 0;
+    if (q >= 0) points_->ask_for({q + numbers, s.step_factor[first + l], at_rest});
+  }
+}
+
 int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points, std::int64_t numbers, double* P, double* dP) const noexcept {
   LawBatch batch;
   batch.n = n;
@@ -62,6 +72,8 @@ int BatchWork::evaluate_laws(int n, BatchScratch& s, const std::int32_t* points,
   batch.dP = dP;
   if (samples()) batch.lateral = s.lateral;
   if (dissipates()) batch.dissipated = s.dissipated;
+  if (wants_ends()) batch.external = {external_, s.owner, s.far};
+  if (limits_step(s)) batch.step_factor = s.step_factor;
   if (points_) batch.state = begin_state(n, s, numbers);
   const int bad = (s.one_law >= 0 ? laws_.evaluate_law(static_cast<std::size_t>(s.one_law), batch, s.law) : laws_.evaluate(batch, s.law)).inadmissible;
   if (points_ && bad < 0) end_state(n, s, numbers);
@@ -172,6 +184,7 @@ int BatchWork::pass(int n, BatchScratch& s, const std::int32_t* points, std::int
   if (bad >= 0) return bad;
   if (laminates && laminates->n > 0) bad = evaluate_laminates(s, tangent ? nullptr : P, tangent ? P : nullptr, *laminates);
   if (bad >= 0) return bad;
+  if (limits_step(s)) ask_for_steps(0, n, weight, s, numbers);
   add_energies(n, weight, s, 0, energy);
   if (along_) add_samples(n, s, s.own_weight, *along_, true);
   for (int l = 0; l < n && tangent; l += pack_width) (-Pack::load(weight + l)).store(weight + l);

@@ -44,6 +44,7 @@ struct BatchScratch {
   alignas(64) double highest[batch_points];  ///< of psi over the laws of both ends, where bonds are screened (result)
   alignas(64) double lateral[batch_points];
   alignas(64) double dissipated[batch_points];
+  alignas(64) double step_factor[batch_points];
   // Selective map: gradients before it, and where the volume changes of the owners are, by end (to be filled in by the engine),
   // `volume` a place to gather them; weighted pressures on the owners by end (result).
   alignas(64) double Ht[9 * batch_points];
@@ -113,6 +114,7 @@ struct BatchTask {
   bool selective = false;                ///< gradients go through the selective map
   MaterialPoints* points = nullptr;      ///< of laws that remember
   double time_step = 0;                  ///< of the step that laws take [s]
+  std::span<const ExternalValue> external = {};   ///< given to laws
   bool ends_step = false;                ///< what they remember at its end is kept, and what they dissipate counts
   const Balance* balance = nullptr;      ///< in place of laws
   BondScreen* screen = nullptr;          ///< where bonds that may hold too much are marked
@@ -128,6 +130,7 @@ class BatchWork {
         selective_(task.selective),
         points_(task.points && task.points->remember() ? task.points : nullptr),
         time_step_(task.time_step),
+        external_(laws.read_external() ? task.external : std::span<const ExternalValue>()),
         ends_step_(task.ends_step),
         balance_(task.balance),
         screen_(task.screen),
@@ -147,6 +150,8 @@ class BatchWork {
   bool tangent() const noexcept { return work_ == Work::tangent; }
   /// The evaluation ends a step in which laws dissipate.
   bool dissipates() const noexcept { return work_ == Work::force && points_ && ends_step_ && laws_.dissipates(); }
+  /// The evaluation ends a step that may be too long for a law.
+  bool limits_step(const BatchScratch& s) const noexcept { return points_ && laws_.limit_steps() && keeps_history(s); }
   /// After evaluate, where bonds are screened: marks the group of eight points from first_point on if one of them may hold too
   /// much. Lanes first_lane ... first_lane + lanes - 1 belong to these points in turn.
   void screen(std::int64_t first_point, int first_lane, int lanes, const BatchScratch& s) const noexcept;
@@ -159,6 +164,8 @@ class BatchWork {
   /// After evaluate: names the bonds of n lanes that may hold too much. far_end: the lane of the far end's evaluation point of lane 0; -1: none. Of
   /// evaluation points with factors these; null: 1.
   void screen_bonds(int n, int far_end, const BatchScratch& s, const double* factor = nullptr, const double* far_factor = nullptr) const;
+  /// Whether laws ask between which points the lanes lie: s.owner and s.far (-1: at the owner) are to be filled in.
+  bool wants_ends() const noexcept { return !external_.empty(); }
   /// Whether the numbers of lanes are asked for.
   bool numbered() const noexcept { return points_ || laminates_; }
   /// Some evaluation points are laminates.
@@ -224,6 +231,8 @@ class BatchWork {
   /// Of the lanes of a batch; their numbers plus `numbers`.
   LawState begin_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
   void end_state(int n, BatchScratch& s, std::int64_t numbers) const noexcept;
+  /// Of lanes first ... first + n - 1 that have a weight: tells the points which step their laws ask for.
+  void ask_for_steps(int first, int n, const double* weight, const BatchScratch& s, std::int64_t numbers) const;
   bool keeps_history(const BatchScratch& s) const noexcept { return work_ == Work::force && ends_step_ && s.keep_history; }
 
   const Laws& laws_;
@@ -232,6 +241,7 @@ class BatchWork {
   bool selective_, pulled_back_ = false;
   MaterialPoints* points_;               ///< null where nothing is remembered
   double time_step_;
+  std::span<const ExternalValue> external_;
   bool ends_step_;
   const Balance* balance_;
   BondScreen* screen_;

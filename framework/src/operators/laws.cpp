@@ -13,12 +13,14 @@ Laws::Laws(Space space, std::vector<MaterialRecord> records, std::span<const std
   for (const MaterialRecord& record : records_) {
     state_ = std::max(state_, record.material->state_components(space));
     dissipates_ |= record.traits.dissipates;
+    limit_steps_ |= record.traits.limits_step;
+    read_external_ |= !record.material->external().empty();
     growth_.push_back(growth_of(record, space));
   }
 }
 
 Laws::GrowthOfLaw Laws::growth_of(const MaterialRecord& record, Space space) {
-  if (!record.uniform || record.material->state_components(space) > 0) return {};
+  if (!record.uniform || record.material->state_components(space) > 0 || !record.material->external().empty()) return {};
   if (record.traits.green_linear) return {.known = Growth::green_linear, .kappa = record.material->small_strain(record.constants.data()).bulk()};
   MaterialRecord isochoric = record;
   if (!record.material->isochoric_constants(record.constants.data(), isochoric.constants.data())) return {};
@@ -59,8 +61,32 @@ void Laws::prepare(LawScratch& scratch, bool tangents) const {
   std::size_t constants = 1;
   for (const MaterialRecord& record : records_) constants = std::max(constants, static_cast<std::size_t>(record.traits.constants));
   scratch.constants.assign(constants * batch_points, 0.0);
+  std::size_t external = 0;
+  for (const MaterialRecord& record : records_) external = std::max(external, record.material->external().size());
+  scratch.external.assign(external * batch_points, 0.0);
   scratch.history.assign(static_cast<std::size_t>(state_) * batch_points, 0.0);
+  scratch.begin.assign(static_cast<std::size_t>(state_) * batch_points, 0.0);
   if (tangents) scratch.A.assign(static_cast<std::size_t>(components() * components()) * batch_points, 0.0);
+}
+
+void Laws::find_external(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch, MaterialBatch& call) noexcept {
+  const std::span<const ExternalVariable> variables = record.material->external();
+  const auto n = static_cast<std::size_t>(batch.n);
+  for (std::size_t k = 0; k < variables.size(); ++k) {
+    double* const row = scratch.external.data() + k * batch_points;
+    const auto given = std::ranges::find(batch.external.values, variables[k].name, &ExternalValue::name);
+    const bool known = given != batch.external.values.end(), field = known && given->field.data;
+    for (std::size_t l = 0; l < n && field; ++l) {
+      const double* const value = given->field.component(0);
+      const double own = value[batch.external.owner[l]];
+      const std::int32_t far = batch.external.far ? batch.external.far[l] : -1;
+      row[l] = far < 0 ? own : 0.5 * (own + value[far]);
+    }
+    const std::size_t from = field ? n : 0;
+    std::fill(row + from, row + padded(n), field ? row[0] : known ? given->value : variables[k].reference);
+  }
+  call.external = variables.empty() ? nullptr : scratch.external.data();
+  call.external_stride = batch_points;
 }
 
 Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept {
@@ -77,10 +103,13 @@ Status Laws::evaluate_one(const MaterialRecord& record, const LawBatch& batch, L
   call.lateral = batch.lateral;
   if (record.traits.dissipates) call.dissipated = batch.dissipated;
   else if (batch.dissipated) std::fill_n(batch.dissipated, padded(static_cast<std::size_t>(batch.n)), 0.0);
+  if (record.traits.limits_step) call.step_factor = batch.step_factor;
+  else if (batch.step_factor) std::fill_n(batch.step_factor, padded(static_cast<std::size_t>(batch.n)), 1.0);
   call.time_step = batch.state.time_step;
   call.state_old = batch.state.begin;
   call.state_new = batch.state.end;
   call.state_stride = batch.state.stride;
+  if (read_external_) find_external(record, batch, scratch, call);
   call.constants = record.constants.data();
   if (!record.uniform) {
     const auto count = static_cast<std::size_t>(record.traits.constants);
@@ -109,6 +138,8 @@ Status Laws::evaluate_among_silent(const MaterialRecord& record, const LawBatch&
   };
   keep(batch.psi, 1);
   keep(batch.dissipated, 1);
+  for (int l = 0; batch.step_factor && l < batch.n; ++l)
+    if (stores[l] == 0) batch.step_factor[l] = 1.0;
   keep(batch.P, components());
   keep(batch.dP, components());
   keep(batch.A, components() * components());
@@ -148,7 +179,14 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     part.dP = batch.dP ? scratch.dP : nullptr;
     part.lateral = batch.lateral ? scratch.lateral : nullptr;
     part.dissipated = batch.dissipated ? scratch.dissipated : nullptr;
+    part.step_factor = batch.step_factor ? scratch.step_factor : nullptr;
     part.A = batch.A ? scratch.A.data() : nullptr;
+    // What another law remembers at its lanes means nothing to this one.
+    for (int c = 0; batch.state.begin && c < records_[m].material->state_components(space_); ++c)
+      for (std::size_t l = 0; l < padded(static_cast<std::size_t>(batch.n)); ++l)
+        scratch.begin[static_cast<std::size_t>(c) * batch_points + l] =
+            l < static_cast<std::size_t>(batch.n) && mine(static_cast<int>(l)) ? batch.state.begin[static_cast<std::size_t>(c) * batch.state.stride + l] : 0.0;
+    if (batch.state.begin) part.state.begin = scratch.begin.data();
     if (batch.state.end) part.state.end = scratch.history.data();   // the state of mixed batches has stride batch_points
     const Status one = evaluate_one(records_[m], part, scratch);
     if (!one.ok() && (status.ok() || one.inadmissible < status.inadmissible)) status = one;
@@ -161,6 +199,7 @@ Status Laws::evaluate(const LawBatch& batch, LawScratch& scratch) const noexcept
     keep(batch.psi, scratch.psi, 1, batch_points);
     keep(batch.lateral, scratch.lateral, 1, batch_points);
     keep(batch.dissipated, scratch.dissipated, 1, batch_points);
+    keep(batch.step_factor, scratch.step_factor, 1, batch_points);
     keep(batch.P, scratch.P, components(), batch_points);
     keep(batch.dP, scratch.dP, components(), batch_points);
     keep(batch.A, scratch.A.data(), components() * components(), batch_points);

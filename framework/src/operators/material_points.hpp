@@ -1,10 +1,14 @@
 #pragma once
 /// The laws of a body at the evaluation points of one space, and what they remember there.
 
+#include <algorithm>
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <mutex>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "perikit/core/field.hpp"
 #include "perikit/operators/laws.hpp"
@@ -51,6 +55,22 @@ class MaterialPoints {
         values[c * batch_points + l] = numbers[l] < 0 ? 0.0 : begin_[c * stride_ + static_cast<std::size_t>(numbers[l])];
   }
 
+  /// A step that was too long for the law of an evaluation point.
+  struct TooLong {
+    std::int64_t number;
+    double factor;    ///< the share of its length that the law asks for
+    bool at_rest;     ///< where H is exactly zero, perhaps because no bond is left that could deform it
+  };
+  /// From any thread.
+  void ask_for(const TooLong& asked) {
+    const std::lock_guard lock(guard_);
+    const auto least = std::ranges::find(too_long_, false, &TooLong::at_rest);   // of those that move the least is enough
+    if (asked.at_rest || least == too_long_.end()) too_long_.push_back(asked);
+    else if (asked.factor < least->factor || (asked.factor == least->factor && asked.number < least->number)) *least = asked;
+  }
+  /// What laws have asked for since this was called last.
+  std::vector<TooLong> take_too_long() noexcept { return std::exchange(too_long_, {}); }
+
   /// An evaluation of the whole body has written the end of a step.
   void step_ended() noexcept { ended_ = true; }
   /// The step that ended is done: its end is the beginning from now on. Nothing where none has ended since the last one.
@@ -71,6 +91,8 @@ class MaterialPoints {
   std::size_t components_, stride_;
   AlignedVector<double> begin_, end_;
   bool ended_ = false;
+  std::mutex guard_;
+  std::vector<TooLong> too_long_;
 };
 
 }  // namespace perikit

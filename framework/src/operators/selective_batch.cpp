@@ -206,6 +206,10 @@ int BatchWork::mapped_pass(int n, BatchScratch& s, int ends) const noexcept {
   double* const rate = tangent ? s.other : nullptr;
   const bool one_law = this->one_law(s);
   if (ends == 2 && !one_law) std::copy_n(s.far, lanes, s.owner + lanes);
+  if (ends == 2 && wants_ends()) {
+    std::copy_n(s.far, lanes, s.owner + lanes);
+    std::copy_n(s.owner, lanes, s.far + lanes);
+  }
   if (ends == 2 && points_) {
     for (int l = 0; l < lanes; ++l) {
       if (s.first_number >= 0) s.number[l] = s.first_number + l;
@@ -215,6 +219,7 @@ int BatchWork::mapped_pass(int n, BatchScratch& s, int ends) const noexcept {
   }
   int bad = evaluate_laws((ends - 1) * lanes + n, s, one_law ? nullptr : s.owner, 0, s.P, rate);
   if (bad >= 0) return bad % lanes;
+  for (int end = 0; end < ends && limits_step(s); ++end) ask_for_steps(end * lanes, n, end == 0 ? s.weight : s.far_weight, s, 0);
   if (laminates_ && s.one_law < 0) {
     // What is mapped for either end is a laminate of its own: their owners' volumes differ.
     LaminateLanes laminates;

@@ -64,6 +64,10 @@ EvaluationStatus BodyProblem::sample(PointSamples& samples) {
 
 void BodyProblem::describe(EvaluationStatus& status) const {
   if (status.ok()) return;
+  if (status.step_factor < 1) {
+    status.description = fmt::format("the material {} asks for a step of {:.3g} of this length {}", parts_.materials[status.material], status.step_factor, status.description);
+    return;
+  }
   status.description = fmt::format("inadmissible deformation {}, kinematics {}, material {}", status.description, parts_.kinematics, parts_.materials[status.material]);
 }
 
@@ -74,9 +78,9 @@ EvaluationStatus BodyProblem::evaluate_forces(const Configuration& at, FieldView
   const Sampling asked = std::exchange(along_, Sampling::nothing);
   if (at.motion() && (!at.motion()->inside() || asked != Sampling::nothing || surroundings_.any())) at.motion()->finish();
   // Where histories go on or bonds fail between forces and samples these are others.
-  if (asked != Sampling::nothing && !terms().material_points() && !ghosts() && !parts_.fracture) {
+  if (asked != Sampling::nothing && !terms().material_points() && !ghosts() && !parts_.fracture && at.external().empty()) {
     PointSamples samples{.asked = asked};
-    status = terms().forces_and_samples(Configuration(seen(u, seen_), at.time(), at.time_step(), at.velocity()), force, energy, samples);
+    status = terms().forces_and_samples(at.seen_as(seen(u, seen_)), force, energy, samples);
     if (status.ok()) kept_ = std::move(samples);
     kept_at_ = fingerprint_of(u);
   } else {
@@ -84,11 +88,11 @@ EvaluationStatus BodyProblem::evaluate_forces(const Configuration& at, FieldView
   }
   describe(status);
   energy_wanted_ = energy != nullptr;
-  // What is looked for on all ranks, all ranks look for.
-  if (weak_springs_ && weak_springs_->any()) surroundings_.agree(status);
-  if (weak_springs_ && status.ok()) {
-    if (weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
-    else status = weak_springs_->refuse(seen(u, seen_));
+  // What is looked for on all ranks, all ranks look for: whether there are loose pieces they all know, whether forces are there they are to agree upon.
+  if (weak_springs_ && weak_springs_->any()) {
+    surroundings_.agree(status);
+    if (status.ok() && weak_springs_->hold()) weak_springs_->add_forces(u, force, energy);
+    else if (status.ok()) status = weak_springs_->refuse(seen(u, seen_));
   }
   finish(force, status);
   return status;

@@ -20,10 +20,20 @@ std::vector<const Body*> bodies_of(const std::vector<World::Member>& members) {
 }
 
 /// What a body sees of a configuration, all of which is there.
-Configuration of_slice(const Points::Slice& slice, const Configuration& at, ConstFieldView u) {
-  const Configuration own(slice.of(u), at.time(), at.time_step(), slice.of(at.velocity()));
-  return at.ends_step() ? own : own.moved_to(slice.of(u));
-}
+class OfSlice {
+ public:
+  OfSlice(const Points::Slice& slice, const Configuration& at, ConstFieldView u)
+      : own_(slice.of(u), at.time(), at.time_step(), slice.of(at.velocity())), external_(at.external().begin(), at.external().end()) {
+    for (ExternalValue& value : external_) value.field = slice.of(value.field);
+    if (!at.ends_step()) own_ = own_.moved_to(slice.of(u));
+    own_ = own_.with_external(external_);
+  }
+  operator const Configuration&() const noexcept { return own_; }
+
+ private:
+  Configuration own_;
+  std::vector<ExternalValue> external_;
+};
 
 }  // namespace
 
@@ -78,7 +88,7 @@ EvaluationStatus World::forces(const Configuration& at, FieldView force, double*
   double stored = 0;
   EvaluationStatus status = each_body([&](Terms& terms, const Points::Slice& slice) {
     double of_body = 0;
-    const EvaluationStatus own = terms.forces(of_slice(slice, at, u), slice.of(force), energy ? &of_body : nullptr);
+    const EvaluationStatus own = terms.forces(OfSlice(slice, at, u), slice.of(force), energy ? &of_body : nullptr);
     stored += of_body;
     return own;
   });
@@ -86,7 +96,7 @@ EvaluationStatus World::forces(const Configuration& at, FieldView force, double*
   std::vector<GroupEnergy> energies;
   status = each_between([&](Term& term) {
     if (energy) energies.assign(points_.stride() / padding, {});
-    const std::int64_t bad = term.forces(Configuration(u, at.time(), at.time_step(), at.velocity()), {}, {force, energies});
+    const std::int64_t bad = term.forces(at.seen_as(u), {}, {force, energies});
     if (energy) stored += stored_in(energies);
     return bad;
   });
@@ -98,7 +108,7 @@ EvaluationStatus World::tangent(const Configuration& at, ConstFieldView w, Field
   if (alone()) return members_.front().terms->tangent(at, w, Kw);
   const ConstFieldView u = at.u();
   const EvaluationStatus status =
-      each_body([&](Terms& terms, const Points::Slice& slice) { return terms.tangent(of_slice(slice, at, u), slice.of(w), slice.of(Kw)); });
+      each_body([&](Terms& terms, const Points::Slice& slice) { return terms.tangent(OfSlice(slice, at, u), slice.of(w), slice.of(Kw)); });
   if (!status.ok()) return status;
   return each_between([&](Term& term) { return term.tangent(at.moved_to(u), w, {}, Kw); });
 }

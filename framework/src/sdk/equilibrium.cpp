@@ -20,6 +20,7 @@ Equilibrium::Equilibrium(Problem& problem, double tolerance)
 void Equilibrium::begin(double t, ConstFieldView u, double time_step) {
   t_ = t;
   time_step_ = time_step;
+  step_factor_ = 1;
   copy(u, u_);
   if (external_.data && !problem_.loads().follow()) problem_.loads().evaluate(t, external_);
   Field noise = problem_.make_field();
@@ -37,6 +38,7 @@ double Equilibrium::missing(ConstFieldView u, FieldView w) {
 }
 
 bool Equilibrium::goes_on() {
+  if (step_factor_ < 1) return false;   // failure_ says why
   if (!observer_ || !observer_->interrupted()) return true;
   stopped_ = true;
   failure_ = "the run was stopped";
@@ -49,6 +51,7 @@ bool Equilibrium::residual(ConstFieldView u, FieldView r, double* energy) {
   const EvaluationStatus status = problem_.evaluate_forces(at(u), internal, energy);
   if (!status.ok()) {
     failure_ = status.description;
+    step_factor_ = status.step_factor;
     return false;
   }
   copy(internal, r);

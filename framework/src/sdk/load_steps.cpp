@@ -138,7 +138,7 @@ class LoadSteps {
     for (;;) {
       Solution solution = attempt(span, last_span() > 0);
       // A continuation that cannot even be evaluated is dropped before the step is.
-      if (!solution.converged && solution.iterations == 0 && last_span() > 0) solution = attempt(span, false);
+      if (!solution.converged && solution.iterations == 0 && last_span() > 0 && equilibrium_.step_factor() == 1) solution = attempt(span, false);
       if (solution.converged) settle(span, solution);
       if (solution.converged) {
         accept(span, solution);
@@ -146,16 +146,19 @@ class LoadSteps {
       }
       give_up();
       if (equilibrium_.stopped()) return false;
+      const double asked = equilibrium_.step_factor();
+      if (asked < 1) solution.failure = equilibrium_.failure();
       const double t = (position() + span) / planned();
       equilibrium_.note(fmt::format("  no equilibrium at t = {:.9g}: {}", t, solution.failure));
       observer_.log(equilibrium_.take_notes());   // a step that fails may take long to do so
-      if (span / 2 < smallest) {
+      if (asked < 1 ? span <= smallest : span / 2 < smallest) {
         throw RunError(fmt::format(
             "{}: no equilibrium found beyond load parameter {:.9g} (after step {}): the smallest step, {:.3g}, failed because {}. More steps or cut_backs may "
             "help; past a limit point (snap-through, buckling, failure of the material) the load cannot grow, and the path is not followed{}",
             integrator_, state_.time, state_.step, span / planned(), solution.failure, hint_of_volumes()));
       }
-      span /= 2;
+      // In whole smallest steps, so that sums of spans stay exact.
+      span = asked < 1 ? std::max(std::floor(span * asked / smallest), 1.0) * smallest : span / 2;
       increment() = span;
     }
   }

@@ -38,6 +38,7 @@ std::string obstacle(const Scene& scene, const PartFactory& factory, const PartV
   const std::shared_ptr<const Material> material = factory.material(part);
   if (material->state_components(space) > 0) return fmt::format("\"{}\" has a history", part.type);
   if (!material->traits().hyperelastic) return fmt::format("\"{}\" is no derivative of an energy", part.type);
+  if (!material->external().empty()) return fmt::format("\"{}\" reads variables from outside", part.type);
   // The other side of an interface may lie on another rank, and the number of ranks must change no bit.
   if (varies(part, scene.constants)) return fmt::format("\"{}\" varies in space", part.type);
   return {};

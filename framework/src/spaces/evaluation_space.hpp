@@ -81,7 +81,8 @@ struct SpaceParts {
   bool numbered() const noexcept { return history() || interfaces; }
   /// A bond has one evaluation point for both ends.
   bool bonds_once() const noexcept { return formulation.pair_symmetric && share; }
-  RestingBlocks quiet_blocks(const BlockReach& reach) const { return skip ? RestingBlocks(reach, history()) : RestingBlocks(); }
+  /// None where laws may be stressed at rest.
+  RestingBlocks quiet_blocks(const BlockReach& reach) const { return skip && !laws.read_external() ? RestingBlocks(reach, history()) : RestingBlocks(); }
 };
 
 /// The space of these parts on a body of D dimensions.

@@ -38,6 +38,7 @@ BatchWork Mechanics::work(const Configuration& at, BatchTask task) const noexcep
   task.selective = parts_.formulation.selective();
   task.points = points_.get();
   task.time_step = at.time_step();
+  task.external = at.external();
   task.ends_step = at.ends_step();
   task.laminates = laminates_.get();
   return {parts_.laws, task};
@@ -122,26 +123,54 @@ void Mechanics::average_state(std::string_view name, std::size_t components, std
     const auto p = static_cast<std::size_t>(points[k]);
     const std::size_t offset = first[parts_.laws.id_of(p)];
     if (offset == nowhere || !space_->evaluates(p)) return;
-    EvaluationPoints<D>& reader = readers.mine();
     const std::span<double> sum = to.subspan(k * components, components);
     double total = 0;
-    const auto add = [&](double weight, std::int64_t state) {
+    over_states<D>(points[k], readers.mine(), [&](int, double weight, std::int64_t number) {
       total += weight;
-      for (std::size_t c = 0; c < components; ++c) sum[c] += weight * points_->begin()[(offset + c) * points_->stride() + static_cast<std::size_t>(state)];
-    };
-    if (!reader.at_bonds() && reader.points() == 1) {   // its own, with or without bonds
-      if (const std::int64_t state = space_->number_of(points[k], -1, 0).state; state >= 0) add(1, state);
-      return;
-    }
-    reader.read(p);
-    for (int q = 0; q < reader.points(); ++q) {
-      const double weight = reader.weight(q);
-      if (weight == 0) continue;
-      if (const std::int64_t state = space_->number_of(points[k], reader.far(q), q).state; state >= 0) add(weight, state);
-    }
+      for (std::size_t c = 0; c < components; ++c) sum[c] += weight * points_->begin()[(offset + c) * points_->stride() + static_cast<std::size_t>(number)];
+    });
     for (std::size_t c = 0; c < components && total != 0; ++c) sum[c] /= total;
   });
 }
+
+template <int D, class Visit>
+void Mechanics::over_states(std::int32_t p, EvaluationPoints<D>& reader, Visit&& visit) const {
+  const auto at = [&](double weight, std::int32_t far, int part) {
+    if (const std::int64_t number = weight == 0 ? -1 : space_->number_of(p, far, part).state; number >= 0) visit(part, weight, number);
+  };
+  if (!reader.at_bonds() && reader.points() == 1) return at(1, -1, 0);
+  reader.read(static_cast<std::size_t>(p));
+  for (int q = 0; q < reader.points(); ++q) at(reader.weight(q), reader.far(q), q);
+}
+
+/// Of several points with the same wish the first in the order of the input.
+template <int D>
+StatefulTerm::ShorterStep Mechanics::shortest(std::vector<MaterialPoints::TooLong> asked) const {
+  const Body& body = parts_.families.body();
+  EvaluationPoints<D> reader(parts_);
+  ShorterStep found;
+  std::ranges::sort(asked, {}, &MaterialPoints::TooLong::number);
+  // Evaluation points without a gradient fall to H = 0 when their bonds fail: no step is too long for that. Those of bond shapes have no weight then.
+  const auto deforms = [&](std::size_t p, int q) {
+    if (parts_.formulation.bond) return true;
+    reader.read(p);
+    const double* const g = reader.gradient(q);
+    return std::any_of(g, g + reader.bonds() * D, [](double component) { return component != 0; });
+  };
+  for (const std::int32_t p : body.internal()) {
+    const auto at = static_cast<std::size_t>(p);
+    if (!body.owns(at) || !space_->evaluates(at)) continue;
+    over_states<D>(p, reader, [&](int q, double, std::int64_t number) {
+      const auto of_q = std::ranges::lower_bound(asked, number, {}, &MaterialPoints::TooLong::number);
+      if (of_q == asked.end() || of_q->number != number || (of_q->at_rest && !deforms(at, q))) return;
+      const bool first = found.point < 0 || body.number(at) < body.number(static_cast<std::size_t>(found.point));
+      if (of_q->factor < found.factor || (of_q->factor == found.factor && first)) found = {of_q->factor, p};
+    });
+  }
+  return found;
+}
+
+StatefulTerm::ShorterStep Mechanics::shorter_step() { return shorter_; }
 
 void Mechanics::find_laminates(GroupMarks marks, bool again) {
   for (std::size_t g = 0; g < marks.size(); ++g) marks[g] &= laminates_->near()[g];
@@ -160,8 +189,12 @@ std::int64_t Mechanics::add_forces(const Configuration& at, const Region& region
   pass.motion = at.motion();
   if (pass.motion && !space_->moves_points()) pass.motion->finish();
   space_->run(pass);
-  if (at.ends_step() && region.whole() && pass.bad < 0) points_->step_ended();
-  return pass.bad;
+  std::vector<MaterialPoints::TooLong> too_long = points_->take_too_long();
+  shorter_ = {};
+  if (pass.bad >= 0) return pass.bad;
+  if (!too_long.empty()) shorter_ = with_dimension(parts_.families.body().dimension(), [&](auto d) { return shortest<d>(std::move(too_long)); });
+  if (at.ends_step() && region.whole() && shorter_.point < 0) points_->step_ended();
+  return -1;
 }
 
 std::int64_t Mechanics::tangent(const Configuration& at, ConstFieldView w, const Region& region, FieldView Kw) {

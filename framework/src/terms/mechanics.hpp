@@ -5,6 +5,9 @@
 
 namespace perikit {
 
+template <int D>
+class EvaluationPoints;
+
 /// Laws at the evaluation points of a space: E = sum_q W_q psi(F_q), with the map between the gradients of the space and those of
 /// the laws. Force, tangent action, energy and samples stand here once, for every space.
 class Mechanics final : public Term, public AssembledTerm, public SampledTerm, public BreakableTerm, public StatefulTerm {
@@ -35,6 +38,7 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   void history_restored() override { space_->history_restored(); }
   std::vector<HistoryPlace> history_points() override;
   void average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) override;
+  ShorterStep shorter_step() override;
   bool dissipates() const noexcept override { return parts_.laws.dissipates(); }
 
   /// A constant stress is in equilibrium from now on, where the body is whole.
@@ -50,6 +54,14 @@ class Mechanics final : public Term, public AssembledTerm, public SampledTerm, p
   std::vector<HistoryPlace> history_points();
   template <int D>
   void average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) const;
+  /// visit(q, weight, number) of each evaluation point of p that remembers something and has a weight; one of p itself has it with or without bonds.
+  template <int D, class Visit>
+  void over_states(std::int32_t p, EvaluationPoints<D>& reader, Visit&& visit) const;
+  /// The shortest step that is asked for at evaluation points of this rank which have a gradient.
+  template <int D>
+  ShorterStep shortest(std::vector<MaterialPoints::TooLong> asked) const;
+
+  ShorterStep shorter_;   ///< of the last evaluation of forces
 
   SpaceParts parts_;
   std::unique_ptr<EvaluationSpace> space_;

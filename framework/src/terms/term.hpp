@@ -135,6 +135,12 @@ class StatefulTerm {
   /// to[k * components + c] <- component c of the variable of this name at points[k], averaged over the evaluation points that belong to the point by their weights; 0 where
   /// the law of the point has none, or no bond is left. Laws that have it give it so many components.
   virtual void average_state(std::string_view name, std::size_t components, std::span<const std::int32_t> points, std::span<double> to) = 0;
+  /// Of the last evaluation of forces, if it ended a step: the share of its length that a law asks for, and an internal index of a point of that law; 1, -1: none does.
+  struct ShorterStep {
+    double factor = 1;
+    std::int64_t point = -1;
+  };
+  virtual ShorterStep shorter_step() = 0;
   /// Energies that are dissipated in a step come with its forces.
   virtual bool dissipates() const noexcept = 0;
 };

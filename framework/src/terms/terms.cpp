@@ -91,14 +91,26 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
 
 Terms::~Terms() = default;
 
-EvaluationStatus Terms::status(std::int64_t bad, const Term* term) const {
+EvaluationStatus Terms::at_point(std::int64_t point) const {
   EvaluationStatus status;
-  if (bad < 0) return status;
   const Body& body = parts_.families->body();
-  const Point x = body.position(static_cast<std::size_t>(bad));
-  status.point = body.number(static_cast<std::size_t>(bad));
-  if (!body.material_ids().empty()) status.material = body.material_ids()[static_cast<std::size_t>(bad)];
-  status.description = fmt::format("({}) at point {} at ({:.6g}, {:.6g}, {:.6g})", (term ? *term : *terms_.front()).inadmissible(), status.point, x[0], x[1], x[2]);
+  const Point x = body.position(static_cast<std::size_t>(point));
+  status.point = body.number(static_cast<std::size_t>(point));
+  if (!body.material_ids().empty()) status.material = body.material_ids()[static_cast<std::size_t>(point)];
+  status.description = fmt::format("at point {} at ({:.6g}, {:.6g}, {:.6g})", status.point, x[0], x[1], x[2]);
+  return status;
+}
+
+EvaluationStatus Terms::status(std::int64_t bad, const Term* term) const {
+  if (bad < 0) return {};
+  EvaluationStatus status = at_point(bad);
+  status.description = fmt::format("({}) {}", (term ? *term : *terms_.front()).inadmissible(), status.description);
+  return status;
+}
+
+EvaluationStatus Terms::too_long_step(std::int64_t point, double factor) const {
+  EvaluationStatus status = at_point(point);
+  status.step_factor = factor;
   return status;
 }
 
@@ -148,20 +160,22 @@ EvaluationStatus Terms::forces_by(Add&& add, const Configuration& at, FieldView 
   ExactSum stored;
   std::int64_t bad = -1;
   const Term* met = nullptr;
+  StatefulTerm::ShorterStep shorter;
   for (std::size_t t = 0; t < terms_.size() && bad < 0; ++t) {
     met = terms_[t].get();
-    const StatefulTerm* const remembers = terms_[t]->stateful();
+    StatefulTerm* const remembers = terms_[t]->stateful();
     const bool dissipates = remembers && remembers->dissipates() && at.ends_step();
     if (energy || dissipates) energies_[t].assign(groups(), {});
     bad = add(*terms_[t], ForceSum{force, energy || dissipates ? std::span(energies_[t]) : std::span<GroupEnergy>(), energy != nullptr, screen_});
     if (energy) add_owned(energies_[t], &GroupEnergy::stored, stored);
+    if (remembers && at.ends_step() && bad < 0) shorter = remembers->shorter_step();
     if (!dissipates) continue;
     dissipated_ = {};
     add_owned(energies_[t], &GroupEnergy::dissipated, dissipated_);
   }
   if (screen_ && bad < 0) screen_->end(at.u());
   if (energy) *energy = total_over_ranks(stored);
-  return status(bad, met);
+  return bad < 0 && shorter.point >= 0 ? too_long_step(shorter.point, shorter.factor) : status(bad, met);
 }
 
 EvaluationStatus Terms::forces(const Configuration& at, FieldView force, double* energy) {

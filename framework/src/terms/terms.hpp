@@ -82,6 +82,8 @@ class Terms {
   std::unique_ptr<VolumetricRows> volumetric_rows() const;
   /// That an evaluation of this term, or of the first one, met this inadmissible point (field index), or none (-1).
   EvaluationStatus status(std::int64_t bad, const Term* term = nullptr) const;
+  /// That a law at this point asks for a step of this share of its length.
+  EvaluationStatus too_long_step(std::int64_t point, double factor) const;
   const Body& body() const noexcept;
   /// sum += energies of the groups of eight points of the body that this rank owns.
   void add_owned(std::span<const GroupEnergy> energies, double GroupEnergy::* which, ExactSum& sum) const;
@@ -130,6 +132,8 @@ class Terms {
   template <class Visit>
   EvaluationStatus each_term(Visit&& visit);
   StatefulTerm* stateful() const noexcept;
+  /// A point and its law, with its place in words.
+  EvaluationStatus at_point(std::int64_t point) const;
   std::size_t groups() const noexcept;
   class PointBlocks;
   struct Assemblies;

@@ -2,8 +2,11 @@
 /// Where a body is, and when: what every evaluation of forces, tangents and samples takes, by value.
 
 #include "perikit/core/field.hpp"
+#include <span>
+
 #include "perikit/core/parallel.hpp"
 #include "perikit/core/point_motion.hpp"
+#include "perikit/model/external.hpp"
 
 namespace perikit {
 
@@ -26,9 +29,24 @@ class Configuration {
   double time_step() const noexcept { return time_step_; }
   bool ends_step() const noexcept { return ends_step_; }
 
+  /// What is given to laws from outside; none by default.
+  std::span<const ExternalValue> external() const noexcept { return external_; }
+
+  /// The same with these values, which must outlive it.
+  Configuration with_external(std::span<const ExternalValue> values) const noexcept {
+    Configuration other = *this;
+    other.external_ = values;
+    return other;
+  }
+  /// The same, with the displacements of this field in place of its own, all of which are there.
+  Configuration seen_as(ConstFieldView u) const noexcept {
+    Configuration other = with(nullptr, nullptr);
+    other.u_ = u;
+    return other;
+  }
   /// The same time and step at other displacements, where the step does not end: what laws would remember is not kept.
   Configuration moved_to(ConstFieldView u) const noexcept {
-    Configuration other(u, time_, time_step_, velocity_);
+    Configuration other = seen_as(u);
     other.ends_step_ = false;
     return other;
   }
@@ -54,6 +72,7 @@ class Configuration {
   ConstFieldView u_, velocity_;
   double time_, time_step_;
   bool ends_step_;
+  std::span<const ExternalValue> external_;
   Arrival* arrival_ = nullptr;
   PointMotion* motion_ = nullptr;
 };

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "perikit/core/space.hpp"
+#include "perikit/model/external.hpp"
 
 namespace perikit {
 
@@ -19,6 +20,7 @@ struct MaterialTraits {
   bool green_linear = false;  ///< S is linear in the Green strain E, 3 kappa I of E = I (kappa of Moduli::bulk): P(a F) = a^3 P(F) + 3 kappa a (a^2 - 1)/2 F
   bool symmetric_tangent = true;   ///< A_ij,kl = A_kl,ij: of hyperelastic laws always; of others where they say so
   bool dissipates = false;    ///< psi is the energy that is stored; of laws with history, which say what their steps dissipate
+  bool limits_step = false;   ///< of laws with history: some steps are too long for it, and it says by how much
 };
 
 /// Lame constants of the law at F = I [Pa].
@@ -41,6 +43,8 @@ struct MaterialBatch {
   const double* dH = nullptr;  ///< direction of dP [-]
   const double* constants = nullptr;  ///< read them by `constant`
   std::size_t constant_stride = 0;    ///< 0: the same constants at all points; else each point has its own
+  const double* external = nullptr;   ///< variables from outside: number k at point p is external[k * external_stride + p], or where that is 0 external[k]; null: all have their reference values
+  std::size_t external_stride = 0;
   const double* state_old = nullptr;  ///< history at the beginning of the step; null: fresh (all zeros)
   double* state_new = nullptr;        ///< history if the step ends at H
   std::size_t state_stride = 0;  ///< component c of the history at point p: state[c * state_stride + p]; a multiple of `padding`
@@ -50,6 +54,9 @@ struct MaterialBatch {
   double* lateral = nullptr;     ///< H33 that plane stress (or H22 = H33 that line stress) found [-]; one component
   double* A = nullptr;           ///< A[(r * components + c) * stride + p] = dP_r / dF_c [Pa]
   double* dissipated = nullptr;  ///< what the step from state_old to H dissipates [J/m^3], never negative; of laws that declare it
+  /// The share of its length that the step from state_old to H should have had at most, above 0: below 1 it was too long, and what else is returned counts for nothing; of
+  /// laws that declare it (limits_step).
+  double* step_factor = nullptr;
 
   /// Constant k at point p, and where it is stored.
   double constant(std::size_t k, int p) const noexcept { return *constant_at(k, p); }
@@ -105,6 +112,8 @@ class Material {
   /// What it remembers, in the order of MaterialBatch::state_old; empty: the law depends on F alone.
   virtual std::span<const StateVariable> state(Space) const noexcept { return {}; }
   int state_components(Space space) const noexcept { return components_of(state(space)); }
+  /// What it reads from outside, in the order of MaterialBatch::external. At the reference values it is a law as all others are; at others it may be stressed at rest.
+  virtual std::span<const ExternalVariable> external() const noexcept { return {}; }
   /// Overwrites every wanted output for all n points. P(0) is exactly zero.
   virtual Status evaluate(Space space, const MaterialBatch& batch) const noexcept = 0;
 

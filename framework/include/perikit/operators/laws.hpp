@@ -33,11 +33,14 @@ struct LawScratch {
   alignas(64) double psi[batch_points];
   alignas(64) double lateral[batch_points];
   alignas(64) double dissipated[batch_points];
+  alignas(64) double step_factor[batch_points];
   alignas(64) double P[9 * batch_points];
   alignas(64) double dP[9 * batch_points];
   AlignedVector<double> constants;
+  AlignedVector<double> external;        ///< of laws that read any
   AlignedVector<double> A;               ///< only where tangents are asked for
-  AlignedVector<double> history;         ///< of laws that have one
+  AlignedVector<double> history;         ///< of laws that have one, at the end of the step,
+  AlignedVector<double> begin;           ///< and at its beginning
 };
 
 /// What laws remember, of the lanes of a batch: component c of lane l is [c * stride + l]. Batches that may mix laws have stride batch_points.
@@ -46,6 +49,13 @@ struct LawState {
   double* end = nullptr;                 ///< where to put it if the step ends here; null: not wanted
   std::size_t stride = 0;
   double time_step = 0;                  ///< [s]
+};
+
+/// What is given to laws from outside, and between which points the lanes of a batch lie. far: -1 where a lane belongs to its owner alone; null: all do. Both are read where a value is a field.
+struct LawSurroundings {
+  std::span<const ExternalValue> values;
+  const std::int32_t* owner = nullptr;
+  const std::int32_t* far = nullptr;
 };
 
 struct LawBatch {
@@ -59,8 +69,10 @@ struct LawBatch {
   double* dP = nullptr;
   double* A = nullptr;                   ///< A[(r * components + c) * batch_points + l] = dP_r / dF_c [Pa]
   LawState state;                        ///< of laws with history
+  LawSurroundings external{};            ///< of laws that read variables from outside
   double* lateral = nullptr;             ///< H33 that plane and line stress found; see MaterialBatch
   double* dissipated = nullptr;          ///< in the step; see MaterialBatch
+  double* step_factor = nullptr;         ///< likewise; 1 of laws that take any step
 };
 
 class Laws {
@@ -78,6 +90,10 @@ class Laws {
   int state_components() const noexcept { return state_; }
   /// Some law says what its steps dissipate.
   bool dissipates() const noexcept { return dissipates_; }
+  /// Some law reads variables from outside.
+  bool read_external() const noexcept { return read_external_; }
+  /// Some steps may be too long for some law.
+  bool limit_steps() const noexcept { return limit_steps_; }
   /// Both points have the same law and the same constants, so that a symmetric bond needs one evaluation.
   bool same(std::size_t p, std::size_t q) const noexcept {
     return ids_.empty() ? records_[0].uniform : ids_[p] == ids_[q] && records_[ids_[p]].uniform;
@@ -118,6 +134,7 @@ class Laws {
   /// One law on all lanes, whose results at points that store nothing are made zero.
   Status evaluate_among_silent(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept;
   Status evaluate_one(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch) const noexcept;
+  static void find_external(const MaterialRecord& record, const LawBatch& batch, LawScratch& scratch, MaterialBatch& call) noexcept;
 
   struct GrowthOfLaw {
     Growth known = Growth::unknown;
@@ -134,7 +151,7 @@ class Laws {
   bool single_;
   std::size_t silent_;                   ///< the first record that stores nothing
   int state_ = 0;                        ///< components of history, the most of any law
-  bool dissipates_ = false;
+  bool dissipates_ = false, limit_steps_ = false, read_external_ = false;
 };
 
 }  // namespace perikit

@@ -58,7 +58,9 @@ class Equilibrium {
   void watch(Observer& observer) { observer_ = &observer; }
   /// Whether an evaluation failed because the run is to end.
   bool stopped() const noexcept { return stopped_; }
-  /// False where the run is to end: evaluations fail from now on, and what works without them, as factorisations do, is to be given up.
+  /// The share of the step's length that a law asks for, for which the step is too long; 1: none has since `begin`.
+  double step_factor() const noexcept { return step_factor_; }
+  /// False where the run is to end, or the step is too long for a law: evaluations fail from now on, and what works without them, as factorisations do, is to be given up.
   bool goes_on();
 
   /// What the observer is told before each line of progress: "round 12, 340 bonds failed". Until the next one.
@@ -71,6 +73,7 @@ class Equilibrium {
   Problem& problem_;
   Observer* observer_ = nullptr;
   bool stopped_ = false;
+  double step_factor_ = 1;
   std::string last_note_, stage_;
   std::int64_t actions_ = 0;   ///< of the tangent since the last note
   std::chrono::steady_clock::time_point logged_ = std::chrono::steady_clock::now();

@@ -17,6 +17,10 @@
 /// Energy: the work of P on a step is what psi grows by and what is dissipated. A law that loses energy (viscosity, plasticity)
 /// declares traits.dissipates, lets psi be what it stores and puts the rest into HistoryUpdate::dissipated; the run adds it up.
 /// Other laws leave that out: their psi is the work done so far.
+///
+/// A step may be too long for a law: an iteration of its own does not end, or strains grow by more than its update is made for. Such a law declares
+/// traits.limits_step and says in HistoryUpdate::step_factor what share of the step would do. Quasi-static runs then take the step again, as much shorter; explicit ones
+/// end.
 
 #include <array>
 
@@ -33,6 +37,7 @@ struct HistoryUpdate {
   Tensor<T, S> P;
   std::array<T, size> state;
   T dissipated = 0.0;   ///< in this step [J/m^3]; with traits.dissipates
+  T step_factor = 1.0;  ///< above 0; below 1 the step was too long; with traits.limits_step
 };
 
 template <class Law>

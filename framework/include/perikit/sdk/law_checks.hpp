@@ -3,11 +3,25 @@
 
 #include <array>
 #include <concepts>
+#include <cstddef>
 #include <type_traits>
 
 #include "perikit/model/material.hpp"
 #include "perikit/sdk/differentiation.hpp"
 #include "perikit/sdk/history.hpp"
+
+namespace perikit {
+
+/// Variables that a law reads from outside, and numbers that its functions find in k.
+template <class Law>
+inline constexpr std::size_t external_size = [] {
+  if constexpr (requires { Law::external.size(); }) return Law::external.size();
+  else return std::size_t{0};
+}();
+template <class Law>
+inline constexpr std::size_t constants_of = static_cast<std::size_t>(Law::traits.constants) + external_size<Law>;
+
+}  // namespace perikit
 
 namespace perikit::detail {
 
@@ -87,8 +101,9 @@ consteval bool check_law() {
     static_assert(HasHistory<Law> || !requires { Law::template state_components<Solid>; },
                   "a law with history names what it remembers: "
                   "template <class S> static constexpr std::array state{StateVariable{\"stress\", \"Pa\", symmetric_size<S>}}");
+    static_assert(HasHistory<Law> || !Law::traits.limits_step, "a law without history takes no steps: leave out limits_step, or name what it remembers (perikit/sdk/history.hpp)");
     if constexpr (HasHistory<Law>) check_steps<Law>();
-    else check_energy_and_stress<Law, std::array<Pack, Law::traits.constants>>();
+    else check_energy_and_stress<Law, std::array<Pack, constants_of<Law>>>();
   }
   return true;
 }

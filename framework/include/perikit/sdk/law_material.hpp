@@ -18,6 +18,9 @@
 /// its psi reads zero. Laws with history: perikit/sdk/history.hpp. Laws with traits.objective = false are small-strain laws and
 /// accept every finite H. Uniaxial stress needs an isotropic law (both free stretches are taken equal).
 ///
+/// A law that reads variables from outside names them, and finds them behind its constants in k, which is a std::array<Pack, constants_of<MyLaw>>:
+///     static constexpr std::array external{ExternalVariable{"temperature", "K", 293.0}};
+///
 /// Faster, where a root or a division stands at the beginning of all of them: invariants(H), which psi, P and tangent then take as a third
 /// argument (perikit/sdk/differentiation.hpp; rubber_invariants.hpp has those of rubber). In plane and uniaxial stress: the free stretch, its equation,
 /// the tangent that it leaves, or constants with which zero lateral strain has the same stress (perikit/sdk/free_stretch.hpp). Under the selective
@@ -52,7 +55,7 @@ namespace perikit {
 
 /// psi = psi_iso(J^(-1/3) F) + U(J), and the law tells both.
 template <class Law>
-concept HasVolume = requires(const Law& law, const std::array<double, Law::traits.constants>& k) {
+concept HasVolume = external_size<Law> == 0 && requires(const Law& law, const std::array<double, Law::traits.constants>& k) {
   { law.isochoric(k) } -> std::same_as<std::array<double, Law::traits.constants>>;
   { law.volume(0.0, k) } -> std::same_as<VolumeResponse<double>>;
 };
@@ -85,6 +88,11 @@ class LawMaterial final : public Material {
     }
   }
 
+  std::span<const ExternalVariable> external() const noexcept override {
+    if constexpr (external_size<Law> > 0) return Law::external;
+    else return {};
+  }
+
   Status evaluate(Space space, const MaterialBatch& batch) const noexcept override {
     const Status status = as_written(space, batch);
     if (offset_at_rest_.load(std::memory_order_relaxed)) [[unlikely]]
@@ -115,7 +123,7 @@ class LawMaterial final : public Material {
   }
 
  private:
-  using Constants = std::array<Pack, Law::traits.constants>;
+  using Constants = std::array<Pack, constants_of<Law>>;
   static constexpr bool small_strain_law = !Law::traits.objective;
   /// Zero lateral stress: as zero lateral strain with other constants where the law has them.
   template <class Confined, class Open>
@@ -190,9 +198,13 @@ class LawMaterial final : public Material {
   }
 
   static Constants load_constants(const MaterialBatch& b, int p) noexcept {
+    constexpr auto own = static_cast<std::size_t>(Law::traits.constants);
     Constants k;
-    for (std::size_t i = 0; i < k.size(); ++i)
+    for (std::size_t i = 0; i < own; ++i)
       k[i] = b.constant_stride == 0 ? Pack(b.constant(i, p)) : Pack::load(b.constant_at(i, p));
+    if constexpr (external_size<Law> > 0)
+      for (std::size_t i = 0; i < external_size<Law>; ++i)
+        k[own + i] = !b.external ? Pack(Law::external[i].reference) : b.external_stride == 0 ? Pack(b.external[i]) : Pack::load(b.external + i * b.external_stride + p);
     return k;
   }
 
@@ -330,7 +342,7 @@ class LawMaterial final : public Material {
     };
     begin_constants(0);
     for (int p = 0; p < b.n; p += pack_width) {
-      if (b.constant_stride != 0) begin_constants(p);
+      if (b.constant_stride != 0 || (external_size<Law> > 0 && b.external_stride != 0)) begin_constants(p);
       decltype(auto) law = law_at<S>(b, p);
       Tensor<Pack, S> H = load<S>(b.H, b.stride, p);
       PackMask good = Pack(0.0) == Pack(0.0);
@@ -368,10 +380,14 @@ class LawMaterial final : public Material {
         probe += 0.0 * sum_of_components<S>([&](int c) { return P[c]; });
       };
       if constexpr (HasHistory<Law>) {
-        if (b.psi || b.P || b.state_new || b.dissipated) {
+        if (b.psi || b.P || b.state_new || b.dissipated || b.step_factor) {
           const auto end = law.update(H, k);
           if (b.psi) put_energy(end.psi);
           if (b.dissipated) end.dissipated.store(b.dissipated + p);
+          if (b.step_factor) {
+            end.step_factor.store(b.step_factor + p);
+            probe += 0.0 * end.step_factor;
+          }
           if (b.P) put_stress(end.P);
           if (b.state_new)
             for (std::size_t i = 0; i < end.state.size(); ++i) end.state[i].store(b.state_new + i * b.state_stride + p);
@@ -444,6 +460,7 @@ class LawMaterial final : public Material {
       };
       zero(b.psi, 1);
       zero(b.dissipated, 1);
+      if (b.step_factor) b.step_factor[p + lane] = 1.0;
       zero(b.lateral, 1);
       zero(b.P, components);
       zero(b.dP, components);

@@ -51,7 +51,7 @@ class EquilibriumSolver {
 
 /// Runs `problem` from its load parameter to 1. Planned steps are equal, end exactly at k/steps and start from the linear
 /// continuation of the last one. A step that does not converge or meets an inadmissible deformation is halved, at most
-/// `cut_backs` times; every success doubles the step again, up to the planned one. Work of loads and prescribed
+/// `cut_backs` times; one that is too long for a law is shortened at once to the share that the law asks for. Every success doubles the step again, up to the planned one. Work of loads and prescribed
 /// displacements by the trapezoidal rule.
 /// With [damage] bonds fail at equilibria only, and then equilibrium is found again at the same load, until no more fail, or
 /// those that did put the body out of balance by less than 1e-6 of the largest reference so far: then the step counts, in

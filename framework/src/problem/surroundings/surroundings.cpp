@@ -1,5 +1,7 @@
 #include "problem/surroundings/surroundings.hpp"
 
+#include <tuple>
+
 #include "core/ranks/dependent_arrival.hpp"
 #include "perikit/core/communicator.hpp"
 #include "perikit/core/field_operations.hpp"
@@ -54,7 +56,7 @@ EvaluationStatus Surroundings::extending(const Configuration& at, Field& memory,
   copy_to(at.unfinished(), memory);
   ghosts_->start(memory);
   Extension extension(*ghosts_, *images_, memory);
-  return evaluate(Configuration(memory, at.time(), at.time_step(), at.velocity()).arriving(extension));
+  return evaluate(at.seen_as(memory).arriving(extension));
 }
 
 void Surroundings::settle(FieldView force) const {
@@ -68,22 +70,27 @@ void Surroundings::agree(EvaluationStatus& status) const {
   if (!status.ok()) {
     ByteWriter out;
     out.value(status.point);
+    out.value(status.step_factor);
     out.bytes(status.description.data(), status.description.size());
     mine = out.take();
   }
   std::vector<std::byte> first;
-  std::int64_t least = -1;
+  std::tuple<double, std::int64_t> least;   // an inadmissible point before all laws
   for (const std::vector<std::byte>& of_rank : communicator().gather(mine)) {
     if (of_rank.empty()) continue;
-    const auto point = ByteReader(of_rank).value<std::int64_t>();
-    if (least >= 0 && point >= least) continue;
-    least = point;
+    ByteReader in(of_rank);
+    const auto point = in.value<std::int64_t>();
+    const auto factor = in.value<double>();
+    const std::tuple rank{factor < 1 ? factor : 0.0, point};
+    if (!first.empty() && rank >= least) continue;
+    least = rank;
     first = of_rank;
   }
   communicator().broadcast(first);
   ByteReader in(first);
   status.point = in.value<std::int64_t>();
-  status.description.assign(first.size() - sizeof status.point, ' ');
+  status.step_factor = in.value<double>();
+  status.description.assign(first.size() - sizeof status.point - sizeof status.step_factor, ' ');
   in.bytes(status.description.data(), status.description.size());
 }
 

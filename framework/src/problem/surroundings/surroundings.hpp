@@ -53,7 +53,7 @@ class Surroundings {
 
   /// Forces of the terms -> those of the problem: of images they go to where they belong, those on ghosts are nobody's.
   void settle(FieldView force) const;
-  /// A failure on one rank becomes one on all of them, which say the same: that of the point that comes first.
+  /// A failure on one rank becomes one on all of them, which say the same: that of the inadmissible point that comes first, else the shortest step that a law asks for.
   void agree(EvaluationStatus& status) const;
   /// Ends an evaluation: one status for all ranks, and forces of the problem.
   void finish(FieldView force, EvaluationStatus& status) const;
@@ -72,11 +72,10 @@ template <class Evaluate>
 EvaluationStatus Surroundings::arriving(const Configuration& at, Field& memory, Evaluate&& evaluate) {
   if (!any()) return evaluate(at);
   const ConstFieldView u = at.unfinished();
-  const auto seen_at = [&](ConstFieldView field) { return Configuration(field, at.time(), at.time_step(), at.velocity()); };
-  if (!ghosts_) return evaluate(seen_at(seen(u, memory)));
+  if (!ghosts_) return evaluate(at.seen_as(seen(u, memory)));
   if (images_) return extending(at, memory, evaluate);
   ghosts_->start(Seen::writable(u));
-  return evaluate(seen_at(Seen(u, ghosts())).arriving(*ghosts_));
+  return evaluate(at.seen_as(Seen(u, ghosts())).arriving(*ghosts_));
 }
 
 template <class Fill>

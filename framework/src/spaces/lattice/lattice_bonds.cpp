@@ -215,7 +215,7 @@ int LatticeBonds<D>::bonds_of_chunk(std::size_t index, std::size_t slot, int slo
         s.far[k * chunk_points + l] = static_cast<std::int32_t>((masks[k] >> l & 1) ? p + shifts[k] + l : p + l);
       }
   };
-  if (pass.work.samples() || (!laws_.single() && s.one_law < 0)) set_ends();
+  if (pass.work.samples() || (!laws_.single() && s.one_law < 0) || pass.work.wants_ends()) set_ends();
   if (pass.work.numbered()) number(index, slot, slots, slot + static_cast<std::size_t>(slots) <= slots_each(), s);
   const int bad = pass.work.evaluate(lanes, s, both_ends, energy);
   if (bad >= 0) return bad;

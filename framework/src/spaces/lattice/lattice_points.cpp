@@ -40,7 +40,7 @@ bool LatticePoints<D>::evaluate(const std::int32_t* index, int n, BatchScratch& 
     // A point without bonds shows its own values, and its history is part of the state that a run goes on from.
     for (int l = 0; l < chunk_points && pass.work.work() == Work::sample; ++l)
       if (s.weight[lane + l] == 0 && (pattern.live >> l & 1)) s.weight[lane + l] = 1e-300;
-    if ((!laws_.single() && s.one_law < 0) || pass.gathers_only()) {
+    if ((!laws_.single() && s.one_law < 0) || pass.gathers_only() || pass.work.wants_ends()) {
       for (int l = 0; l < chunk_points; ++l) {
         s.owner[lane + l] = chunk(index[i]).first + l;
         s.far[lane + l] = -1;

@@ -185,7 +185,7 @@ std::int32_t Weighted<D>::evaluate_family(std::int32_t p, std::int64_t number, M
 template <int D>
 template <class Stencil>
 std::int32_t Weighted<D>::evaluate_point(std::int32_t p, std::int64_t number, Stencil stencil, Memory& m, BatchScratch& s, Pass& pass, GroupEnergy* energy) {
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.gathers_only(), ends = sample || pass.work.screens_bonds();
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.gathers_only(), ends = sample || pass.work.screens_bonds() || pass.work.wants_ends();
   double* const H = selective_ ? s.Ht : s.H;
   double* const dH = selective_ ? s.dHt : s.dH;
   const double volume = weight(p);
@@ -250,7 +250,7 @@ std::int32_t Weighted<D>::together(std::size_t group, Memory& m, BatchScratch& s
   const MirroredStencil<D>& stencil = stencils_[static_cast<std::size_t>(g.stencil)];
   const std::int32_t* members = members_.data() + g.first;
   const LanePoints points{members, g.count, g.contiguous, classes_[static_cast<std::size_t>(g.family)].shifts.data()};
-  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.gathers_only(), ends = sample || pass.work.screens_bonds();
+  const bool tangent = pass.work.tangent(), sample = pass.work.work() == Work::sample, alone = pass.gathers_only(), ends = sample || pass.work.screens_bonds() || pass.work.wants_ends();
   const std::uint8_t here = lanes(g, pass);
   const bool all = here == (1u << g.count) - 1;
   const auto bonds = static_cast<std::size_t>(stencil.bonds()), evaluated = static_cast<std::size_t>(stencil.points());
@@ -345,13 +345,12 @@ std::int32_t Weighted<D>::side_by_side(std::size_t group, std::size_t b, Memory&
       s.weight[l] = in ? lane_weight[lane] * stencils.share(stencil + lane, first + l / 8) : 0.0;
       s.number[l] = k < 0 || !in ? -1 : number + 8 * k + static_cast<std::int64_t>(lane);
     }
+    if (sample || pass.work.wants_ends())
+      for (int l = 0; l < 8 * n; ++l) s.far[l] = far_of_part(first + l / 8 - owners_, pass);
     const int bad = pass.work.evaluate(8 * n, s, false, energy);
     if (bad >= 0) return s.owner[bad];
     pass.work.screen(members.data(), static_cast<int>(members.size()), 8 * n, s);
-    if (sample) {
-      for (int l = 0; l < 8 * n; ++l) s.far[l] = far_of_part(first + l / 8 - owners_, pass);
-      pass.add_samples(8 * n, s);
-    }
+    if (sample) pass.add_samples(8 * n, s);
     if (alone) continue;
     if (selective_) add_pressures(8 * n, 8, s, tangent, m);
     pass.work.weigh_stress(8 * n, s);
