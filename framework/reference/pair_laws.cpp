@@ -48,8 +48,8 @@ struct PairLaw {
       const double omega = cloud.omega(i, j) * cloud.volume[j], broken = cloud.intact(i, j) * omega;
       omega0 += omega;
       f.fraction += broken;
-      f.m += broken * length(i, j) * length(i, j);
-      f.theta += broken * length(i, j) * extension(i, j);
+      f.m += cloud.factored(i, j) * broken * length(i, j) * length(i, j);
+      f.theta += cloud.factored(i, j) * broken * length(i, j) * extension(i, j);
     }
     if (f.m > 0) f.theta *= cloud.dimension / f.m;
     if (omega0 > 0) f.fraction /= omega0;
@@ -63,14 +63,14 @@ struct PairLaw {
     if (name == "bond_based") {
       const double c = micromodulus(d, cloud.horizon, e);
       for (const int j : cloud.family(i))
-        sum += cloud.intact(i, j) * c * std::pow(extension(i, j), 2) / length(i, j) * cloud.volume[j] / 4;
+        sum += cloud.factored(i, j) * cloud.intact(i, j) * c * std::pow(extension(i, j), 2) / length(i, j) * cloud.volume[j] / 4;
       return sum;
     }
     const Family f = family(i);
     if (f.m <= 0) return 0;
     for (const int j : cloud.family(i)) {
       const double deviatoric = extension(i, j) - (d == 1 ? 0.0 : f.theta * length(i, j) / d);
-      sum += cloud.intact(i, j) * cloud.omega(i, j) * cloud.volume[j] * deviatoric * deviatoric;
+      sum += cloud.factored(i, j) * cloud.intact(i, j) * cloud.omega(i, j) * cloud.volume[j] * deviatoric * deviatoric;
     }
     if (d == 1) return f.fraction * e.bulk(1) * sum / (2 * f.m);
     const double shear = d == 3 ? 15 * e.mu : 8 * e.mu;
@@ -80,7 +80,7 @@ struct PairLaw {
   /// Scalar force state t_ij [N/m^6].
   double state(int i, int j, const Family& f) const {
     const int d = cloud.dimension;
-    const double b = cloud.intact(i, j), x = length(i, j), extended = extension(i, j);
+    const double b = cloud.factored(i, j) * cloud.intact(i, j), x = length(i, j), extended = extension(i, j);
     if (b == 0) return 0;
     if (name == "bond_based") return b * micromodulus(d, cloud.horizon, e) * extended / x / 2;
     const double factor = f.fraction * b * cloud.omega(i, j) / f.m;

@@ -26,12 +26,14 @@ struct Cloud {
   double horizon = 0;                              ///< delta [m]
   std::function<double(double)> influence;         ///< omega(r), r = |xi| / delta
   std::function<double(int, int)> integrity = {};  ///< b_ij in [0, 1], symmetric; empty: intact
+  std::function<double(int, int)> factor = {};     ///< f_ij of pair laws, symmetric; empty: 1. In the linear solid it is that of omega in all sums but the surviving fraction
   bool failed = false;                             ///< bonds that are not intact were so at the set-up, and failed
 
   int points() const { return static_cast<int>(position.size()); }
   /// X_j - X_i [m].
   Vector bond(int i, int j) const { return position[j] - position[i]; }
   double omega(int i, int j) const { return influence(bond(i, j).norm() / horizon); }
+  double factored(int i, int j) const { return factor ? factor(i, j) : 1.0; }
   double intact(int i, int j) const { return integrity ? integrity(i, j) : 1.0; }
   /// All j != i in the closed ball delta (1 + 1e-10), ascending, broken bonds included.
   std::vector<int> family(int i) const;

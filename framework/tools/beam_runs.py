@@ -10,8 +10,8 @@ import turned_lattice
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "configs/fracture/double_cantilever.toml"
 KINEMATICS = {  # by name in the tables
-    "`bond_based`": "bond_based",
-    "`ordinary`": "ordinary",
+    "`bond_based`": '{type="bond_based",surface_correction="none"}',
+    "`ordinary`": '{type="ordinary",surface_correction="none"}',
     "`baqp`": "baqp",
     "`projection`": "projection",
     "`bond_associated`": "bond_associated",

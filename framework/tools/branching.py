@@ -28,11 +28,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "configs/fracture/branching.toml"
 NOTCH, GC = 0.05, 3.0  # [m], [J/m^2]
 STRESS = {"bond_based": 2.0e6, "baqp": 3.0e6}  # at which they branch on coarse lattices, too [Pa]
+SETTINGS = {"bond_based": '{type="bond_based",surface_correction="none"}'}
 LATTICES = [("along", 0, 0.0), ("turned by 30 degrees", 30, 0.0), ("jittered by 0.2", 0, 0.2)]
 
 
 def run(perikit, folder, spacing, kinematics, ratio, degrees, jitter, threads):
-    settings = ["kinematics=" + kinematics, "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
+    settings = ["kinematics=" + SETTINGS.get(kinematics, kinematics), "family.horizon_ratio=%g" % ratio, "constants.dx=%g" % spacing,
                 "constants.sigma=%g" % STRESS[kinematics]]
     if not degrees:
         settings += ["body.lattice.spacing=%g" % spacing] + (["body.lattice.jitter=%g" % jitter] if jitter else [])

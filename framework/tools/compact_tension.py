@@ -22,8 +22,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENE = ROOT / "configs/fracture/compact_tension.toml"
 E, GC, W, A0, EDGE = 3e9, 500.0, 0.04, 0.018, 0.01
 KINEMATICS = {  # by name in the table
-    "`bond_based`": "bond_based",
-    "`ordinary`": "ordinary",
+    "`bond_based`": '{type="bond_based",surface_correction="none"}',
+    "`ordinary`": '{type="ordinary",surface_correction="none"}',
     "`baqp`": "baqp",
     "`projection`": "projection",
     "`bond_associated`": "bond_associated",

@@ -8,8 +8,8 @@
 # Folder, name in the table, setting, opening of each end [m] by energies set free and held: cracks that cost more are opened farther.
 # Of pair laws both energies are the same.
 all=(
-  bond_based '`bond_based`' bond_based 1.8e-3 ''
-  ordinary '`ordinary`' ordinary 1.8e-3 ''
+  bond_based '`bond_based`' '{type="bond_based",surface_correction="none"}' 1.8e-3 ''
+  ordinary '`ordinary`' '{type="ordinary",surface_correction="none"}' 1.8e-3 ''
   baqp '`baqp`' baqp 1.8e-3 1.8e-3
   projection '`projection`' projection 1.8e-3 1.8e-3
   bond_augmented '`bond_augmented`' bond_augmented 1.8e-3 1.8e-3
@@ -28,7 +28,7 @@ coarse=(
 )
 # By other criteria, with the settings that they need.
 others=(
-  bond_based '`bond_based`' bond_based false
+  bond_based '`bond_based`' '{type="bond_based",surface_correction="none"}' false
   baqp '`baqp`' baqp true
   wan '`conventional` with `wan`' "$wan" true
   bond_associated '`bond_associated`' bond_associated true

@@ -35,8 +35,8 @@ mode_I() {
   run "mode_I_$1" partmann/mode_I 'boundary=[{set="top",velocity=["free",0.5,"free"]},{set="bottom",velocity=["free",-0.5,"free"]}]' \
     integrator.end_time=1e-5 output.frames=10 body.lattice.spacing=$fine_I constants.dx=$fine_I "${@:2}"
 }
-mode_I bond_based kinematics=bond_based
-mode_I ordinary kinematics=ordinary
+mode_I bond_based 'kinematics={type="bond_based",surface_correction="none"}'
+mode_I ordinary 'kinematics={type="ordinary",surface_correction="none"}'
 mode_I silling_low "$(silling 0.3)"
 mode_I silling_high "$(silling 3.0)"
 mode_I wan "$wan"
@@ -47,8 +47,8 @@ mode_I baqp $cubic
   "$out/mode_I_silling_high" 'conventional, silling 3' "$out/mode_I_wan" 'conventional, wan' "$out/mode_I_baqp" 'baqp, cubic_spline'
 
 tension() { run "tension_$1" partmann/boundary_tension body.lattice.spacing=$fine_tension constants.dx=$fine_tension "${@:2}"; }
-tension bond_based kinematics=bond_based
-tension ordinary kinematics=ordinary
+tension bond_based 'kinematics={type="bond_based",surface_correction="none"}'
+tension ordinary 'kinematics={type="ordinary",surface_correction="none"}'
 tension silling "$(silling 1.0)"
 tension wan "$wan"
 tension baqp kinematics=baqp damage.consistent=true

@@ -20,8 +20,8 @@ stabilized() { printf '{type="conventional",stabilization={type="%s"%s}}' "$1" "
 selective() { printf '{type="selective",base="%s"}' "$1"; }
 # Folder, name in the table, setting; by cost.
 all=(
-  bond_based '`bond_based`' bond_based
-  ordinary '`ordinary`' ordinary
+  bond_based '`bond_based`' '{type="bond_based",surface_correction="none"}'
+  ordinary '`ordinary`' '{type="ordinary",surface_correction="none"}'
   conventional '`conventional`' conventional
   silling '`conventional` with `silling`, 1' "$(stabilized silling ,coefficient=1.0)"
   wan '`conventional` with `wan`' "$(stabilized wan)"

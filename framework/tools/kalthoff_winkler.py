@@ -24,8 +24,8 @@ import turned_lattice
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PLATE, SOLID = (ROOT / "configs/fracture" / name for name in ("kalthoff_winkler.toml", "kalthoff_winkler_3d.toml"))
 KINEMATICS = {  # by name: settings
-    "bond_based": ["kinematics=bond_based"],
-    "ordinary": ["kinematics=ordinary"],
+    "bond_based": ['kinematics={type="bond_based",surface_correction="none"}'],
+    "ordinary": ['kinematics={type="ordinary",surface_correction="none"}'],
     "baqp": ["kinematics=baqp"],
     "conventional, silling": ['kinematics={type="conventional",stabilization={type="silling",coefficient=1.0}}'],
 }

@@ -6,8 +6,8 @@
 
 # Folder, name in the tables, setting.
 all=(
-  bond_based '`bond_based`' bond_based
-  ordinary '`ordinary`' ordinary
+  bond_based '`bond_based`' '{type="bond_based",surface_correction="none"}'
+  ordinary '`ordinary`' '{type="ordinary",surface_correction="none"}'
   baqp '`baqp`' baqp
   projection '`projection`' projection
   bond_associated '`bond_associated`' bond_associated

@@ -204,7 +204,7 @@ TEST_CASE("cli: the end of a run tells time, speed, memory, energy balance and w
   REQUIRE(at != std::string::npos);
   CHECK(std::stod(run.out.substr(at + 15)) < 0.01);
   // Neither Poisson's ratio 0.3 nor one stiffness in all directions is what the bonds of this lattice have.
-  const Result warned = desk.perikit("run scene.toml -o warned --set kinematics.type=bond_based");
+  const Result warned = desk.perikit("run scene.toml -o warned --set 'kinematics={type=\"bond_based\",surface_correction=\"none\"}'");
   CHECK_MESSAGE(contains(warned.out, "warnings      2\n  warning"), warned.out);
 }
 

@@ -316,13 +316,15 @@ TEST_CASE("questionable: pair laws whose bonds do not add up to the material, by
                        "times the energy of the material",
                        of_stretch, of_all, of_shear, of_other);
   };
-  warned(square, "--set 'kinematics={type=\"bond_based\"}'", words("1.15", "1.03", "0.66", "1.40"));
-  warned(square, "--set 'kinematics={type=\"ordinary\"}' --set family.influence=cubic_spline --set family.horizon_ratio=3.015", words("1.02", "1.00", "0.91", "1.09"));
-  silent(square, "--set 'kinematics={type=\"ordinary\"}' --set family.influence=cubic_spline --set family.horizon_ratio=4.015");
-  silent(square, "--set 'kinematics={type=\"bond_based\"}' --set 'run.silence=[\"pair_law\"]'");
+  warned(square, "--set 'kinematics={type=\"bond_based\",surface_correction=\"none\"}'", words("1.15", "1.03", "0.66", "1.40"));
+  warned(square, "--set 'kinematics={type=\"ordinary\",surface_correction=\"none\"}' --set family.influence=cubic_spline --set family.horizon_ratio=3.015", words("1.02", "1.00", "0.91", "1.09"));
+  silent(square, "--set 'kinematics={type=\"ordinary\",surface_correction=\"none\"}' --set family.influence=cubic_spline --set family.horizon_ratio=4.015");
+  silent(square, "--set 'kinematics={type=\"ordinary\",surface_correction=\"moments\"}' --set family.influence=cubic_spline --set family.horizon_ratio=3.015");
+  silent(square, "--set 'kinematics={type=\"bond_based\",surface_correction=\"none\"}' --set 'run.silence=[\"pair_law\"]'");
   silent(square);
   const std::string rod = "format = 1\n[body]\ndimension = 1\n[body.lattice]\nspacing = 1.0\nlower = [0]\nupper = [30]\n[family]\nhorizon_ratio = 3.015\n[kinematics]\ntype = \"bond_based\"\n"
                           "[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0\npoisson_ratio = 0.25\n[integrator]\ntype = \"evaluate\"\n";
+  silent(rod, "--set 'kinematics.surface_correction=\"moments\"'");
   warned(rod, "", "inside the body bonds store 1.32 in a stretch along an axis times");
 }
 

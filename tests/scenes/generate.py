@@ -94,6 +94,8 @@ class Generator(Conditions):
         explicit = self.explicit_only or self.maybe(0.6)
         self.integrator_name = self.wish("integrator", lambda: "verlet" if explicit else r.choice(list(self.tables.parts["integrator"])))
         scene["kinematics"] = self.kinematics()
+        if self.kinematics_name in PAIR_LAWS and self.dimension > 1 and scene["family"].get("horizon_ratio") == 1.015:
+            scene["kinematics"] = as_table(scene["kinematics"]) | {"surface_correction": "none"}   # nearest neighbours are too few for factors
         laws = list(self.tables.parts["material"])
         scene["material"] = self.law(laws)
         failing = self.integrator_name != "evaluate" and self.maybe(0.45)

@@ -31,6 +31,13 @@ TEST_CASE("critical_stretch from the energy release rate") {
   CHECK(at(*classic, Space::plane_strain, 0.1) == doctest::Approx(std::sqrt(pi * Gc / (3 * (m.bulk() + m.mu / 3) * delta))).epsilon(1e-14));
   CHECK(at(*classic, Space::plane_stress, 0.1) == doctest::Approx(std::sqrt(pi * Gc / (3 * m.youngs() / (2 * (1 - m.poisson())) * delta))).epsilon(1e-14));
   CHECK(at(*classic, Space::line_stress, 0.1) == doctest::Approx(std::sqrt(3 * Gc / (m.youngs() * delta))).epsilon(1e-14));
+  // Counted bonds take the place of either integral: of 2D 2 psi <xi>/pi = Gc, psi = k (2 s)^2/2.
+  DamagePoint counted{{Space::plane_strain, 1.0, delta, m}, 0.4};
+  counted.counted_length = 0.7;
+  for (const char* const further : {"", "\nconsistent = true"}) {
+    const double s = make("critical_stretch", std::string("energy_release_rate = 0.03") + further)->limits(counted).failure;
+    CHECK(2 * (counted.bulk() * 4 * s * s / 2) * 0.7 / std::numbers::pi == doctest::Approx(0.03).epsilon(1e-12));
+  }
   // The consistent form asks for <xi> alone; with that of omega = xi it is the classic one.
   const auto consistent = make("critical_stretch", "energy_release_rate = 0.03\nconsistent = true");
   CHECK(at(*consistent, Space::solid, 0.3) == doctest::Approx(std::sqrt(4 * Gc / (9 * m.bulk() * 0.3))).epsilon(1e-14));

@@ -227,6 +227,20 @@ TEST_CASE("scenes that cannot be built are refused with file, line, key, what wa
   }
 }
 
+TEST_CASE("a horizon too short for the factors of a pair law is refused, and not without them or on a line") {
+  Bench bench;
+  for (const std::string law : {"bond_based", "ordinary"}) {
+    std::string text = plate;
+    text.replace(text.find("2.015"), 5, "1.015").replace(text.find("type = \"baqp\""), 13, "type = \"" + law + "\"\nsurface_correction = \"moments\"");
+    const std::string message = bench.refusal(text);
+    CHECK(contains(message, "kinematics.surface_correction: found \"moments\" with a horizon of 1.015 spacings, whose bonds are too few for the stiffness of the material"));
+    CHECK(contains(message, "allowed: a longer horizon, from 1.5 spacings on, or surface_correction = \"none\""));
+    std::string wider = text, without = text;
+    CHECK(bench.refusal(wider.replace(wider.find("1.015"), 5, "1.515")).empty());
+    CHECK(bench.refusal(without.replace(without.find("\"moments\""), 9, "\"none\"")).empty());
+  }
+}
+
 TEST_CASE("sides of points from a file are found by volumes, and must be placed where these do not say") {
   Bench bench;
   std::string text = plate_from_file();

@@ -105,7 +105,7 @@ TEST_CASE("critical_energy: the first bonds of an expanded body fail at Gc, with
 namespace {
 
 /// Two halves that are drawn apart: what is dissipated at the interface between them.
-double torn_off(int dimension, const std::string& kinematics, const std::string& damage, double modulus, bool cloud, const std::string& laminates = "") {
+double torn_off(int dimension, const std::string& kinematics, const std::string& damage, double modulus, double jitter, const std::string& laminates = "") {
   const std::string material = "type = \"linear_elastic\", density = 1000.0, poisson_ratio = 0.25, youngs_modulus = ";
   const auto list = [&](const char* along, const char* across) {
     return dimension == 1 ? fmt::format("[{}]", along) : dimension == 2 ? fmt::format("[{}, {}]", along, across) : fmt::format("[{}, {}, {}]", along, across, across);
@@ -117,7 +117,7 @@ double torn_off(int dimension, const std::string& kinematics, const std::string&
       "[[region]]\nset = \"upper\"\nmaterial = {{ {}{} }}\n[damage]\n{}\nenergy_release_rate = 1.0e7\nno_fail = [\"top\", \"bottom\"]\n"
       "[[interface]]\nbetween = [\"upper\", \"rest\"]\ndamage = {{ {}, energy_release_rate = 100.0 }}\n"
       "[[boundary]]\nset = \"top\"\nvelocity = {}\n[[boundary]]\nset = \"bottom\"\nvelocity = {}\n[initial]\nvelocity = {}\n[integrator]\ntype = \"verlet\"\nend_time = 0.15\n",
-      dimension, dimension == 1 ? "line = \"stress\"\n" : dimension == 2 ? "plane = \"strain\"\n" : "", list("0", "0"), list("2", fmt::format("{}", width).c_str()), cloud ? 1e-3 : 0.0,
+      dimension, dimension == 1 ? "line = \"stress\"\n" : dimension == 2 ? "plane = \"strain\"\n" : "", list("0", "0"), list("2", fmt::format("{}", width).c_str()), jitter,
       laminates.empty() ? "" : "interfaces = \"" + laminates + "\"\n", kinematics, material, modulus, damage,
       [&] {
         std::string inline_table = damage;
@@ -145,20 +145,31 @@ TEST_CASE("critical_stretch: an interface between unlike halves takes as much as
     for (const bool cloud : {false, true}) {
       if (cloud && s.dimension == 3) continue;
       INFO(fmt::format("{}, {}D, {}", s.kinematics, s.dimension, cloud ? "cloud" : "lattice"));
-      const double equal = torn_off(s.dimension, s.kinematics, s.damage, 1e6, cloud), unlike = torn_off(s.dimension, s.kinematics, s.damage, 1e8, cloud);
+      const double equal = torn_off(s.dimension, s.kinematics, s.damage, 1e6, cloud ? 1e-3 : 0), unlike = torn_off(s.dimension, s.kinematics, s.damage, 1e8, cloud ? 1e-3 : 0);
       MESSAGE(s.kinematics, ", ", s.dimension, "D, ", cloud ? std::string("cloud") : std::string("lattice"), ": G/Gc ", equal, " and ", unlike);
       CHECK(std::abs(unlike - equal) < s.tolerance * equal);
     }
-  const double parallel = torn_off(2, "type = \"bond_based\"", stretch, 1e8, false, "parallel");
+  const double parallel = torn_off(2, "type = \"bond_based\"", stretch, 1e8, 0, "parallel");
   MESSAGE("bond_based, side by side: ", parallel);
   CHECK(std::abs(parallel - 0.9) < 0.1);
+}
+
+TEST_CASE("pair laws with factors by moments: what is torn off takes Gc within 8 %, by stretch and by the shares of energy") {
+  // Without factors `bond_based` takes 0.74 to 0.89 of it, in 2D and 3D. On a line neighbours spring back while bonds fail one by one, as they do without.
+  for (const std::string kinematics : {"bond_based", "ordinary"})
+    for (const std::string damage : {"type = \"critical_stretch\"", "type = \"critical_energy\""})
+      for (const auto& [d, jitter] : {std::pair(2, 0.0), std::pair(3, 0.0), std::pair(2, 0.1)}) {
+        const double ratio = torn_off(d, fmt::format("type = \"{}\"\nsurface_correction = \"moments\"", kinematics), damage, 1e6, jitter);
+        INFO(fmt::format("{}, {}, {}D, jitter {}: G/Gc {}", kinematics, damage, d, jitter, ratio));
+        CHECK(std::abs(ratio - 1) < 0.08);
+      }
 }
 
 TEST_CASE("critical_stretch: bonds across two materials without an interface are no weaker than those of the softer one") {
   // Under a traction along y the soft half has 100 times the strain of the stiff one.
   const std::string scene =
       "format = 1\n[body]\ndimension = 2\nplane = \"strain\"\n[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 2]\n[sets]\nupper = \"y > 1\"\n"
-      "[family]\nhorizon_ratio = 3.015\n[kinematics]\ntype = \"bond_based\"\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.25\n"
+      "[family]\nhorizon_ratio = 3.015\n[kinematics]\ntype = \"bond_based\"\nsurface_correction = \"none\"\n[material]\ntype = \"linear_elastic\"\nyoungs_modulus = 1.0e6\npoisson_ratio = 0.25\n"
       "[[region]]\nset = \"upper\"\nmaterial = { type = \"linear_elastic\", youngs_modulus = 1.0e8, poisson_ratio = 0.25 }\n"
       "[damage]\ntype = \"critical_stretch\"\nenergy_release_rate = 100.0\n[[boundary]]\nset = \"all\"\ndisplacement = [0, 0]\n[integrator]\ntype = \"newton\"\nsteps = 1\n";
   const double limit = std::sqrt(std::numbers::pi * Gc / (3 * 8e5 * 0.3015));

@@ -83,7 +83,7 @@ TEST_CASE("families of hundreds of bonds, and of more cells along a row than ker
     const char* kinematics;
   };
   for (const Case& c : {Case{1, 90, 1, 17.2, "type = \"conventional\""}, {2, 50, 22, 17.2, "type = \"conventional\""}, {2, 50, 22, 17.2, "type = \"baqp\""},
-                        {3, 10, 7, 4.2, "type = \"selective\"\nbase = \"baqp\""}, {3, 10, 7, 4.2, "type = \"ordinary\""}}) {
+                        {3, 10, 7, 4.2, "type = \"selective\"\nbase = \"baqp\""}, {3, 10, 7, 4.2, "type = \"ordinary\"\nsurface_correction = \"none\""}}) {
     CAPTURE(c.dimension);
     CAPTURE(c.kinematics);
     const Forces lattice = forces_of(c.dimension, c.length, c.width, 0, c.kinematics, "", c.ratio);

@@ -203,7 +203,7 @@ std::string pair_scene(const std::string& body, const std::string& law, const st
                      body, law, more);
 }
 
-constexpr const char* pair_laws[] = {"type = \"bond_based\"", "type = \"bond_based\"\nsurface_correction = \"energy\"", "type = \"ordinary\"",
+constexpr const char* pair_laws[] = {"type = \"bond_based\"\nsurface_correction = \"none\"", "type = \"bond_based\"\nsurface_correction = \"energy\"", "type = \"ordinary\"\nsurface_correction = \"none\"",
                                      "type = \"ordinary\"\nsurface_correction = \"energy\""};
 
 }  // namespace

@@ -205,8 +205,23 @@ PointCopies copies_of_points(const ProblemParts& parts, const Images& images) {
   const Body& body = *parts.body;
   copies.mirrored.assign(body.stride(), {1, 1, 1});
   for (std::size_t k = 0; k < images.size(); ++k)
-    copies.mirrored[static_cast<std::size_t>(body.internal()[body.points() - images.size() + k])] = images.operation[k].sign;
+    copies.mirrored[static_cast<std::size_t>(body.internal()[body.points() - images.size() + k])] =
+        images.operation[k].at_surface ? std::array<std::int8_t, 3>{} : images.operation[k].sign;
   return copies;
+}
+
+/// Factors of the bonds of a pair law, refused where bonds are so few that a uniform strain cannot have its energy inside.
+std::shared_ptr<const BondFactors> build_factors(const Scene& scene, const ProblemParts& parts, const Formulation& formulation, const Images& images) {
+  auto factors = find_bond_factors(formulation, *parts.families, *parts.laws, copies_of_points(parts, images));
+  constexpr double most = 0.01;
+  if (factors->inside > most) {
+    const Body& body = *parts.body;
+    throw InputError(scene.kinematics->values.position("surface_correction"), "kinematics.surface_correction",
+                     fmt::format("found \"moments\" with a horizon of {:.4g} spacings, whose bonds are too few for the stiffness of the material: with the best factors it is off by {:.0f} %; "
+                                 "allowed: a longer horizon, from 1.5 spacings on, or surface_correction = \"none\"",
+                                 body.horizon() / body.spacing(), 100 * factors->inside));
+  }
+  return factors;
 }
 
 /// Refuses laws with history where forces are not the derivative of their work.
@@ -250,11 +265,14 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   of_terms.laws = parts.laws.get();
   of_terms.interfaces = beyond.interfaces;
   if (parts.images) of_terms.images = beyond.images;
+  if (of_terms.formulation.pairs && of_terms.formulation.pair_traits.factors != BondFactorsOf::none) {
+    steps.begin("factors of bonds");
+    of_terms.factors = build_factors(scene, parts, of_terms.formulation, *beyond.images);
+  }
   if (scene.damage) steps.begin("limits of bonds");
   std::unique_ptr<const BodyDamage> damage = build_damage(scene, factory, of_terms, parts.images.get(), *beyond.images, partition, quasi_static, warnings);
   steps.begin("weights");
   of_terms.consistency = build_consistency(scene, parts, of_terms.formulation, warnings);
-  if (of_terms.formulation.pairs && of_terms.formulation.pair_traits.factors == BondFactorsOf::moments) of_terms.copies = copies_of_points(parts, *beyond.images);
   of_terms.stabilization = build_stabilization(scene, factory, of_terms.formulation);
   of_terms.further = std::move(further);
   if (TermMaker point_terms = build_point_terms(scene, factory, integrator)) of_terms.further.push_back(std::move(point_terms));

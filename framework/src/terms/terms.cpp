@@ -77,7 +77,8 @@ Terms::Terms(TermParts parts) : parts_(std::move(parts)) {
   const Families& families = *parts_.families;
   const std::shared_ptr<const Interfaces> meeting = parts_.interfaces && !parts_.interfaces->empty() ? parts_.interfaces : nullptr;
   if (formulation.pairs) {
-    terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share, meeting, parts_.images, parts_.copies}));
+    if (!parts_.factors) parts_.factors = find_bond_factors(formulation, families, *parts_.laws, {});
+    terms_.push_back(make_pair_forces({families, formulation, *parts_.laws, parts_.skip, parts_.share, meeting, parts_.images, parts_.factors}));
   } else {
     auto mechanics = std::make_unique<Mechanics>(
         SpaceParts{families, formulation, *parts_.laws, parts_.skip, parts_.share, {}, meeting});

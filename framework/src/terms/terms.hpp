@@ -13,7 +13,7 @@
 #include "perikit/core/exact_sum.hpp"
 #include "perikit/model/stabilization.hpp"
 #include "perikit/operators/laws.hpp"
-#include "terms/pairs/point_copies.hpp"
+#include "terms/pairs/bond_factors.hpp"
 #include "terms/term.hpp"
 
 namespace perikit {
@@ -38,7 +38,7 @@ struct TermParts {
   std::shared_ptr<const Interfaces> interfaces;        ///< where materials meet as laminates; null: nowhere
   std::shared_ptr<const Images> images;                ///< of points of the body; null: none
   std::shared_ptr<CloudConsistency> consistency;       ///< null: not asked for. The first terms that get it find it
-  PointCopies copies;                                  ///< of pair laws whose bonds have factors
+  std::shared_ptr<const BondFactors> factors;          ///< of the bonds of a pair law; null: the terms find them
   std::vector<TermMaker> further;                      ///< what acts beside the formulation
 };
 

@@ -156,9 +156,10 @@ void find_pair_law(BodyProblem& problem, std::vector<std::string>& lines) {
     found += fmt::format("{}{:.2f} in {}", found.empty() ? "" : ", ", ratio, trial.name);
   }
   if (farthest < pair_law_limit) return;
-  lines.push_back(named("pair_law", fmt::format("inside the body bonds store {} times the energy of the material: the stiffness is off by as much, however fine the points are; kinematics with "
-                                                "gradients, such as \"baqp\", are exact there, and another family.horizon_ratio may come closer",
-                                                found)));
+  const bool factors = problem.terms().parts().formulation.pair_traits.factors == BondFactorsOf::moments;
+  lines.push_back(named("pair_law", fmt::format("inside the body bonds store {} times the energy of the material: the stiffness is off by as much, however fine the points are; {}", found,
+                                                factors ? "factors on its bonds cannot do better with these points: a longer horizon or points that lie more evenly, or kinematics with gradients, such as \"baqp\", can"
+                                                        : "surface_correction = \"moments\" and kinematics with gradients, such as \"baqp\", are exact there")));
 }
 
 /// The box of a body's points, with half a spacing around them, without images.

@@ -33,7 +33,8 @@ class CriticalStretch final : public Damage {
   DamageLimits limits(const DamagePoint& x) const override {
     if (energy_release_rate_ <= 0) return {stretch_, stretch_};
     // Bonds whose energy grows with their length (bond_based) are those of omega = xi: 4/5, 3/4, 2/3 of the horizon.
-    const double d = dimension(x.space), mean_length = consistent_ ? x.mean_length : (d + 1) / (d + 2) * x.horizon;
+    const double d = dimension(x.space), of_integral = consistent_ ? x.mean_length : (d + 1) / (d + 2) * x.horizon;
+    const double mean_length = x.counted_length > 0 ? x.counted_length : of_integral;
     const double s = stretch_of(energy_release_rate_, x, mean_length);
     if (!(s > 0) || !std::isfinite(s))
       throw std::domain_error(

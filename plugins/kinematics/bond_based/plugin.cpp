@@ -26,7 +26,7 @@ class BondBased final : public PairKinematics {
     const int d = dimension(x.space);
     const double nu = x.moduli.poisson(), fixed = x.space == Space::plane_stress ? 1.0 / 3 : 1.0 / 4;
     if (d == 1 || std::abs(nu - fixed) <= 1e-6) return {};
-    return fmt::format("bond_based has Poisson's ratio {} in this body; the material's {:.6g} is not represented (its bulk modulus is)",
+    return fmt::format("bond_based has Poisson's ratio {} in this body; the material's {:.6g} is not represented (its bulk modulus is); \"ordinary\" has any Poisson's ratio",
                        d == 2 && fixed > 0.3 ? "1/3" : "1/4", nu);
   }
 
@@ -53,7 +53,7 @@ PartDescription description() {
   PartDescription part{.name = "bond_based",
                        .summary = "pairwise springs, one elastic constant; no gradients, no zero-energy modes",
                        .parameters = {},
-                       .examples = {"", "surface_correction = \"energy\""},
+                       .examples = {"surface_correction = \"none\"", "surface_correction = \"energy\""},
                        .equations = "E = sum over pairs of c s^2 |xi| V_i V_j/2,  s = (|y| - |xi|)/|xi|,  c = (c_i + c_j)/2\n"
                                     "c = 18 K/(pi delta^4) (3D), 12 k'/(pi h delta^3) (2D), 2 E/(A delta^2) (1D)",
                        .source = "Silling, Askari, Computers & Structures 83 (2005) 1526; Partmann et al., GAMM-Mitteilungen 49 (2026) e70014, eqs. 3.8-3.11",

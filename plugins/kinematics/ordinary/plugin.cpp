@@ -63,7 +63,7 @@ PartDescription description() {
   PartDescription part{.name = "ordinary",
                        .summary = "linear peridynamic solid: central forces with a dilatation, two elastic constants; no zero-energy modes",
                        .parameters = {},
-                       .examples = {"", "surface_correction = \"energy\""},
+                       .examples = {"surface_correction = \"none\"", "surface_correction = \"energy\""},
                        .equations = "e = |y| - |xi|,  m_i = sum_j omega |xi|^2 V_j,  theta_i = (d/m_i) sum_j omega |xi| e V_j\n"
                                     "t = omega [3 K theta |xi| + 15 mu (e - theta |xi|/3)]/m  (3D)\n"
                                     "t = omega [2 k' theta |xi| + 8 mu (e - theta |xi|/2)]/m  (2D),  t = E omega e/m  (1D)",

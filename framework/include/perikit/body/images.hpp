@@ -60,6 +60,7 @@ struct SymmetryOperation {
   std::array<std::int8_t, 3> sign{1, 1, 1};
   std::array<double, 3> shift{};               ///< [m]
   std::string mirrors = {};
+  bool at_surface = false;                     ///< one of them is no plane across an axis
   /// -1 after an odd number of reflections at planes that hold displacements along them and none across: stresses turn their sign there.
   std::int8_t of_stress = 1;
 };

@@ -37,6 +37,9 @@ struct DamagePoint : FamilyPoint {
   /// in 3D, 2 h delta^3/3 in 2D, A delta^2/2 in 1D.
   double crossing = 0;
   double crossing_shares = 0;  ///< the same sum with BondStates::share of each bond
+  /// <xi> as the bonds themselves have it, where their factors give every uniform strain its energy: what those that cross an area hold in an expansion, over what the
+  /// integral has for each metre of <xi>. Counted as `crossing`; 0: by the integral [m].
+  double counted_length = 0;
 };
 
 /// Arrays over n bonds that can be read up to padded(n); null where the traits do not ask for them.

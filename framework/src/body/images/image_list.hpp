@@ -77,6 +77,7 @@ class TurningMirrors {
 
  private:
   double even_;
+  std::size_t surfaces_;   ///< so many of the mirrors, the first ones
   std::vector<std::unique_ptr<const Mirror>> mirrors_;
 };
 

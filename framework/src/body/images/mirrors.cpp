@@ -130,7 +130,7 @@ class SurfaceMirror final : public Mirror {
 }  // namespace
 
 TurningMirrors::TurningMirrors(const BodyFrame& frame, std::span<const ImagePlane> planes, std::span<const ImageSurface> surfaces)
-    : even_(1e-6 * frame.spacing) {
+    : even_(1e-6 * frame.spacing), surfaces_(surfaces.size()) {
   const double reach = halo(frame.horizon);
   for (const ImageSurface& surface : surfaces) mirrors_.push_back(std::make_unique<SurfaceMirror>(frame, surface, reach));
   for (const ImagePlane& plane : planes)
@@ -165,6 +165,7 @@ void TurningMirrors::add_images(ImageList& list) const {
         if (!reflected || (on_mirror && n > 0 && (list.position(n) != list.point() || from[n] >= k)) || !deepest(k, reflected->place.at, reflected->depth)) continue;
         SymmetryOperation operation = list.operation(n);
         operation.mirrors.insert(0, 1, static_cast<char>(k));
+        operation.at_surface |= k < surfaces_;
         if (mirrors_[k]->turns_stress()) operation.of_stress = static_cast<std::int8_t>(-operation.of_stress);
         if (on_mirror && n == 0) list.hold(mirrors_[k]->odd(), mirrors_[k]->motion());
         list.add(n, reflected->place, operation, mirrors_[k]->odd(), mirrors_[k]->motion());

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "families/regular_family.hpp"
-#include "fracture/search/bond_energy_split.hpp"
 #include "perikit/core/rank_values.hpp"
 #include "problem/ghosts.hpp"
 
@@ -22,6 +21,7 @@ CrossingBonds count(const FamilyArrays& family, const AlignedVector<double>& sha
   for (std::size_t k = 0; k < family.far.size(); ++k) {
     crossing.plain += family.volume[k] * length(k);
     crossing.shares += share[k] * family.volume[k] * length(k);
+    crossing.of_family += share[k] * family.volume[k];
   }
   return crossing;
 }
@@ -40,9 +40,10 @@ std::optional<CrossingBonds> mean_of_all(const std::vector<OfPoint>& mine) {
   for (const OfPoint& point : all) {
     sum.plain += point.crossing.plain;
     sum.shares += point.crossing.shares;
+    sum.of_family += point.crossing.of_family;
   }
   const auto points = static_cast<double>(all.size());
-  const std::vector<CrossingBonds> mean = told_to_all(all.empty() ? std::vector<CrossingBonds>() : std::vector{CrossingBonds{sum.plain / points, sum.shares / points}});
+  const std::vector<CrossingBonds> mean = told_to_all(all.empty() ? std::vector<CrossingBonds>() : std::vector{CrossingBonds{sum.plain / points, sum.shares / points, sum.of_family / points}});
   if (mean.empty()) return std::nullopt;
   return mean.front();
 }
@@ -72,12 +73,13 @@ bool has_all_sides(const Body& body, const FamilyArrays& family) {
 
 }  // namespace
 
-CrossingBonds crossing_bonds(const Families& families, const Formulation& formulation, const Partition* partition, const ImageMap* images) {
+double half_mean_cosine(int dimension) noexcept { return dimension == 3 ? 0.25 : dimension == 2 ? 1 / std::numbers::pi : 0.5; }
+
+CrossingBonds crossing_bonds(const Families& families, const EnergyShares& energy_shares, const Partition* partition, const ImageMap* images) {
   const Body& body = families.body();
   const int d = body.dimension();
   AlignedVector<double> share;
-  // Half of the mean of |cos| over all directions: 1/4 in 3D, 1/pi in 2D, 1/2 in 1D.
-  const double mean = d == 3 ? 0.25 : d == 2 ? 1 / std::numbers::pi : 0.5;
+  const double mean = half_mean_cosine(d);
   if (!body.lattice()) {
     FamilyArrays family;
     Field all_sides = body.make_field(1);
@@ -92,7 +94,7 @@ CrossingBonds crossing_bonds(const Families& families, const Formulation& formul
     for (const std::int32_t p : body.owned()) {
       if (all_sides.data()[p] == 0) continue;
       families.load(static_cast<std::size_t>(p), BondsOf::uncut, family);
-      energy_shares(formulation, d, family, share);
+      energy_shares.of_point(static_cast<std::size_t>(p), family, share);
       const bool is_whole = std::ranges::all_of(family.far, [&](std::int32_t far) { return all_sides.data()[far] != 0; });
       (is_whole ? whole : others).push_back({body.number(static_cast<std::size_t>(p)), count(family, share, [&](std::size_t k) { return mean * family.length[k]; })});
     }
@@ -100,7 +102,7 @@ CrossingBonds crossing_bonds(const Families& families, const Formulation& formul
       if (const std::optional<CrossingBonds> of_all = mean_of_all(points)) return *of_all;
   }
   const FamilyArrays family = regular_family(families);
-  energy_shares(formulation, d, family, share);
+  energy_shares.of_regular(family, share);
   if (!body.lattice()) return count(family, share, [&](std::size_t k) { return mean * family.length[k]; });
   return count(family, share, [&](std::size_t k) { return std::max(0.0, family.xi[0][k]); });
 }

@@ -210,10 +210,12 @@ std::unique_ptr<const BodyDamage> build_damage(const Scene& scene, const PartFac
     for (const InterfaceDescription& interface : scene.interfaces) warn_of_short_zone(body.frame(), interface.damage->values, length, warnings);
   }
   if (images) damage->copies = std::make_shared<const BondCopies>(*parts.families, made);
-  if (!damage->by_stretch()) {
-    const CrossingBonds crossing = crossing_bonds(*parts.families, parts.formulation, partition, images);
+  const bool moments = parts.formulation.pairs && parts.formulation.pair_traits.factors == BondFactorsOf::moments;
+  if (!damage->by_stretch() || moments) {
+    const CrossingBonds crossing = crossing_bonds(*parts.families, {parts.formulation, *parts.families, parts.factors.get()}, partition, images);
     at.crossing = crossing.plain;
     at.crossing_shares = crossing.shares;
+    if (moments) at.counted_length = crossing.shares / (half_mean_cosine(body.dimension()) * crossing.of_family);
   }
   const bool uniform = laws.records().size() == 1 && laws.records().front().uniform;
   DamageLimits limits;

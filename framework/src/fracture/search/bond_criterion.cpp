@@ -33,6 +33,7 @@ BondCriterion::BondCriterion(const Terms& terms, DamageTraits asked, const BodyD
     : families_(*terms.parts().families),
       body_(families_.body()),
       formulation_(terms.parts().formulation),
+      shares_(formulation_, families_, terms.parts().factors.get()),
       damage_(damage),
       copies_(damage ? damage->copies.get() : nullptr),
       terms_(terms.all()),
@@ -79,7 +80,7 @@ void BondCriterion::set_screen(std::span<const double> factors) {
     most = 0;
     families_.each_class([&](std::span<const std::int32_t> points) {
       families_.load(static_cast<std::size_t>(points[0]), BondsOf::uncut, family);
-      energy_shares(formulation_, body_.dimension(), family, share);
+      shares_.of_point(static_cast<std::size_t>(points[0]), family, share);
       for (std::size_t k = 0; k < family.far.size(); ++k) most = std::max(most, share[k]);
     });
   }
@@ -307,7 +308,7 @@ void BondCriterion::load(std::int32_t p, ConstFieldView u, std::span<const BondI
   for (auto* array : {&m.length, &m.stretch, &m.share, &m.energy, &m.value, &m.onset, &m.failure, &m.integrity})
     array->assign(size, 1.0);
   m.stress.assign(traits_.stress ? 6 * size : 0, 0.0);
-  energy_shares(formulation_, body_.dimension(), m.family, m.all_shares);
+  shares_.of_point(static_cast<std::size_t>(p), m.family, m.all_shares);
   if (flux_.flux.data) release_->of(p, m.family, m.place, u, flux_, samples_, m.energy.data());
   for (std::size_t k = 0; k < n; ++k) {
     const std::int32_t far = m.family.far[m.place[k]];

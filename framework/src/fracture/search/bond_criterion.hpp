@@ -9,6 +9,7 @@
 
 #include "fracture/body_damage.hpp"
 #include "fracture/bond_copies.hpp"
+#include "fracture/search/bond_energy_split.hpp"
 #include "fracture/search/bond_finder.hpp"
 #include "fracture/search/bond_release.hpp"
 #include "terms/terms.hpp"
@@ -89,6 +90,7 @@ class BondCriterion final : public BondFinder {
   const Families& families_;
   const Body& body_;
   const Formulation& formulation_;
+  EnergyShares shares_;
   const BodyDamage* damage_;
   const BondCopies* copies_;  ///< null: the body has no images
   std::span<const std::unique_ptr<Term>> terms_;

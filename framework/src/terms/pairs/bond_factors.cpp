@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/dimension.hpp"
 #include "families/cloud/cloud_families.hpp"
 #include "families/lattice/lattice_families.hpp"
 #include "families/regular_family.hpp"
@@ -31,7 +32,10 @@ double BondFactors::of(const Families& families, std::size_t p, std::size_t far)
     return tables[static_cast<std::size_t>(table_of[p / padding])][slot * padding + p % padding];
   }
   if (by_bond.empty()) return 1;
-  return by_bond[static_cast<std::size_t>(families.cloud()->index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(far)))];
+  const FamilyLists& lists = families.cloud()->lists();
+  const std::int64_t bond = families.cloud()->index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(far));
+  const bool there = bond < lists.first[p + 1] && lists.neighbour[static_cast<std::size_t>(bond)] == static_cast<std::int32_t>(far);
+  return there ? by_bond[static_cast<std::size_t>(bond)] : 1.0;
 }
 
 std::size_t BondFactors::bytes() const noexcept {
@@ -114,6 +118,14 @@ BondFactors moment_factors(const Families& families, const PairKinematics& law, 
   else cloud_factors<D>(families, law, target, copies, factors);
   factors.seconds = communicator().largest(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   return factors;
+}
+
+std::shared_ptr<const BondFactors> find_bond_factors(const Formulation& formulation, const Families& families, const Laws& laws, const PointCopies& copies) {
+  if (!formulation.pairs || formulation.pair_traits.factors == BondFactorsOf::none) return std::make_shared<const BondFactors>();
+  return with_dimension(families.body().dimension(), [&](auto d) {
+    const PairKinematics& law = *formulation.pairs;
+    return std::make_shared<const BondFactors>(formulation.pair_traits.factors == BondFactorsOf::energy ? energy_factors<d>(families, law, laws) : moment_factors<d>(families, law, copies));
+  });
 }
 
 template BondFactors moment_factors<1>(const Families&, const PairKinematics&, const PointCopies&);

@@ -79,7 +79,7 @@ CloudPairs<D>::CloudPairs(const PairLoopParts& parts)
     : PairLoop(parts), families_(*parts.families.cloud()), lists_(families_.lists()), law_(*parts.formulation.pairs), fields_(parts.fields),
       dilatation_(parts.formulation.dilatation != nullptr), points_(families_.body().points()), blocks_(families_.body()),
       position_(reinterpret_cast<const Row*>(families_.body().rows().data())), upper_(points_), pieces_(families_.body()),
-      factors_(fields_.factors.by_bond.empty() ? nullptr : fields_.factors.by_bond.data()), force_(points_) {
+      factors_(fields_.factors->by_bond.empty() ? nullptr : fields_.factors->by_bond.data()), force_(points_) {
   for (std::size_t p = 0; p < points_; ++p) upper_[p] = families_.index(static_cast<std::int32_t>(p), static_cast<std::int32_t>(p));
   const BlockReach reach = cloud_reach(families_.body(), lists_);
   colouring_ = cloud_colouring(families_.body(), lists_, blocks_, reach);
@@ -151,7 +151,7 @@ void CloudPairs<D>::gather(std::size_t p, std::int64_t begin, int n, Gathered& g
   }
   if (dilatation_) {
     for (int l = 0; l < n; l += pack_width) (Pack::load(g.omega + l) * Pack::load(g.length + l)).store(g.weight + l);
-    for (int l = 0; l < n && factor && fields_.factors.of_dilatation; ++l) g.weight[l] *= factor[l];
+    for (int l = 0; l < n && factor && fields_.factors->of_dilatation; ++l) g.weight[l] *= factor[l];
   }
   // Dilatations see their own side of bonds that cross an interface.
   const bool crosses = dilatation_ && fields_.crosses(p);
@@ -231,7 +231,7 @@ bool CloudPairs<D>::run_point(std::size_t p, const PairPass& pass, double& total
       for (int l = 0; l < n; ++l) {
         double value = s.energy[l];
         if (pass.by_theta) value += g.weight[l] * s.e[l] * ((crosses ? g.own_strain[l] : 1.0) * pass.by_theta[p] + (crosses ? g.far_strain[l] : 1.0) * pass.by_theta[neighbour[l]]);
-        if (pass.screen->over_share) value = s.stiffness[l] > 0 ? value / s.stiffness[l] : 0.0;
+        if (pass.screen->over_share) value = s.stiffness[l] > 0 ? value / (s.stiffness[l] * (factors_ ? factors_[begin + l] : 1.0)) : 0.0;
         if (g.far_volume[l] > 0) highest = std::max(highest, value);
       }
     }

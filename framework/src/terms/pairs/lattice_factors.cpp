@@ -78,6 +78,7 @@ class LatticeFactors {
   void find() {
     find_cuts();
     find_corner(0);
+    out_.inside = corners_[0].multipliers->error(0);
     for (int sides = 1; sides <= std::min(D, most_sides_); ++sides) find_corner(sides);
     find_points();
     make_factors();
@@ -234,7 +235,7 @@ class LatticeFactors {
       for (int y = sides > 1 ? x : 0; y < (sides > 1 ? rows : 1); ++y)
         for (int z = sides > 2 ? y : 0; z < (sides > 2 ? rows : 1); ++z) depths.push_back({x, y, z});
     for (std::size_t k = 0; k < depths.size(); ++k) corner.site[depths[k]] = static_cast<std::int32_t>(k);
-    corner.multipliers = std::make_unique<MomentSites<D>>(directions_);
+    corner.multipliers = std::make_unique<MomentSites<D>>(directions_, sides > 1 ? most_factor : std::numeric_limits<double>::infinity());
     const auto cut_at = [&](const std::array<int, 3>& depth) {
       Cut cut;
       cut.flat = true;
@@ -310,12 +311,10 @@ class LatticeFactors {
       polynomials(slot, phi);
       polynomials_.insert(polynomials_.end(), std::begin(phi), std::end(phi));
     }
-    AlignedVector<double> work(bonds, 1.0);
     bonds_.far = far_.data();
     bonds_.weight = bond_weight_.data();
     bonds_.known = bond_known_.data();
-    bonds_.factor = work.data();
-    points_ = std::make_unique<MomentPoints<D, false, Directions>>(body_, bonds_, copies_, Directions{this, slot_of_bond_.data()});
+    points_ = std::make_unique<MomentPoints<D, false, Directions, Pack>>(body_, bonds_, copies_, Directions{this, slot_of_bond_.data()});
     points_->find();
     out_.iterations += points_->iterations();
     asked_ = std::move(chosen);
@@ -332,8 +331,9 @@ class LatticeFactors {
 
   bool whole(std::size_t p) const noexcept { return cut_[p].flat && cut_[p].side == std::array<int, 3>{}; }
   void make_factors() {
+    for (std::size_t s = 0; s < offsets_.size(); ++s) out_.regular.push_back(factor(BelowSides{}, s));
     std::vector<double> inside(families_.slots.size(), 1.0);
-    for (std::size_t slot = 0; slot < inside.size(); ++slot) inside[slot] = factor(BelowSides{}, offset_of_[slot]);
+    for (std::size_t slot = 0; slot < inside.size(); ++slot) inside[slot] = out_.regular[offset_of_[slot]];
     make_tables(families_, inside, [&](const LatticeChunk& chunk) {
       for (auto p = static_cast<std::size_t>(chunk.first), l = std::size_t{0}; l < chunk_points; ++l, ++p) {
         if (!whole(p)) return false;
@@ -396,7 +396,7 @@ class LatticeFactors {
   std::vector<double> bond_weight_, bond_known_;
   std::vector<double> polynomials_;                    ///< [slot][moment]
   std::int64_t first_of_slot_ = 0;
-  std::unique_ptr<MomentPoints<D, false, Directions>> points_;
+  std::unique_ptr<MomentPoints<D, false, Directions, Pack>> points_;
   std::vector<std::uint8_t> asked_;                    ///< by point
 };
 

@@ -108,7 +108,7 @@ class LatticePairs final : public PairLoop {
   /// c f and omega |xi| f as the loops read them.
   void make_tables() {
     const std::size_t slots = families_.slots.size();
-    const BondFactors& factors = fields_.factors;
+    const BondFactors& factors = *fields_.factors;
     table_size_ = slots * chunk_points + batch_points;
     const auto write = [&](std::size_t s, const double* f) {
       const double weight = omega_[s * chunk_points] * length_[s * chunk_points];
@@ -124,7 +124,7 @@ class LatticePairs final : public PairLoop {
     }
   }
   std::size_t table_of(std::int64_t p) const noexcept {
-    return fields_.factors.empty() ? 0 : static_cast<std::size_t>(fields_.factors.table_of[static_cast<std::size_t>(p / chunk_points)]);
+    return fields_.factors->empty() ? 0 : static_cast<std::size_t>(fields_.factors->table_of[static_cast<std::size_t>(p / chunk_points)]);
   }
 
   /// Whether the energies of bonds are asked for.
@@ -166,7 +166,7 @@ class LatticePairs final : public PairLoop {
 template <int D>
 void LatticePairs<D>::moduli(const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, double* out) const noexcept {
   const double *const of_point = fields_.modulus.data() + p,
-               *const factor = fields_.factors.empty() ? nullptr : fields_.factors.tables[table_of(p)].data();
+               *const factor = fields_.factors->empty() ? nullptr : fields_.factors->tables[table_of(p)].data();
   const bool crosses = fields_.crosses(static_cast<std::size_t>(p));
   const auto* const shifts = families_.slots.shifts.data();
   for (int k = 0; k < count; ++k, out += chunk_points) {
@@ -203,6 +203,7 @@ template <int D>
 void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern, std::int64_t p, std::size_t slot, int count, const PairScratch& s) const noexcept {
   Pack highest[chunk_points / pack_width];
   const bool crosses = fields_.crosses(static_cast<std::size_t>(p));
+  const double* const factor = fields_.factors->empty() ? nullptr : fields_.factors->tables[table_of(p)].data();
   for (int k = 0; k < count; ++k) {
     const std::size_t at = slot + static_cast<std::size_t>(k);
     const std::int64_t far = p + families_.slots.shifts[at];
@@ -218,7 +219,9 @@ void LatticePairs<D>::screen(const PairPass& pass, const LatticePattern& pattern
         }
         value += Pack::load(weights_.data() + table_of(p) * table_size_ + at * chunk_points + static_cast<std::size_t>(l)) * Pack::load(s.e + k * chunk_points + l) * (own + other);
       }
-      highest[l / pack_width] = max(highest[l / pack_width], keep(static_cast<std::uint8_t>(pattern.mask[at] >> l), value * per_share));
+      value *= per_share;
+      if (factor && pass.screen->over_share) value *= reciprocal(Pack::load(factor + at * chunk_points + static_cast<std::size_t>(l)));
+      highest[l / pack_width] = max(highest[l / pack_width], keep(static_cast<std::uint8_t>(pattern.mask[at] >> l), value));
     }
   }
   for (int l = 0; l < chunk_points; ++l)

@@ -22,6 +22,9 @@ void cloud_factors(const Families& families, const PairKinematics& law, const Mo
 
 /// No bond has less than this share of its stiffness: points that hang by few bonds stay where they are, and bonds whose failure is watched hold something.
 inline constexpr double least_factor = 0.1;
+/// Nor more than this on clouds and where several sides of a lattice meet: no positive factors give such points their moments, and the stiff bonds that come nearest shorten stable steps to half.
+/// One flat side of a lattice takes what it needs, 4.5 to 26, as it has its moments then.
+inline constexpr double most_factor = 10;
 /// Of the method of multipliers, over curvatures: of the first step, which tells points that can have their moments from those that cannot, and of the later ones.
 inline constexpr double first_multiplier_shift = 1e-2, later_multiplier_shift = 1e-6;
 /// Points whose moments are still off by more than this after the first step cannot have them, and sites of lattices that are off by more than the second after a later one.

@@ -11,7 +11,10 @@ namespace perikit {
 
 namespace {
 
-constexpr int most_steps = 8, most_rounds = 20, most_products = 100;
+constexpr int most_steps = 8, most_rounds = 20;
+/// Of a descent: the steps that pull multipliers to zero, and the links that it may pass in all.
+constexpr int first_steps = 50;
+constexpr double most_links = 2e7;
 /// Unknowns of a small system.
 constexpr std::size_t most_at_once = 700;
 /// Moments with errors below this have what was asked for.
@@ -20,7 +23,7 @@ constexpr double moment_rounding = 1e-13;
 }  // namespace
 
 template <int D>
-MomentSites<D>::MomentSites(std::span<const std::array<double, D>> directions) {
+MomentSites<D>::MomentSites(std::span<const std::array<double, D>> directions, double most) : most_(most) {
   for (const std::array<double, D>& direction : directions) {
     double n[D], phi[moments];
     std::copy(direction.begin(), direction.end(), n);
@@ -40,10 +43,10 @@ template <int D>
 double MomentSites<D>::factor(std::size_t site, std::size_t own_slot, std::size_t far, std::size_t far_slot) const noexcept {
   // The two products first: the sum is the same from both ends.
   const double own = lambda_[site].dot(phi_[own_slot]), other = lambda_[far].dot(phi_[far_slot]);
-  return std::max(least_factor, 1 + (own + other));
+  return std::clamp(1 + (own + other), least_factor, most_);
 }
 
-/// Half of sum_b w_b H(y_b), H' = max(floor, 1 + y), for bonds whose other half the other end has; less what is asked for.
+/// Half of sum_b w_b H(y_b), H' = f, for bonds whose other half the other end has; less what is asked for.
 template <int D>
 double MomentSites<D>::merit(std::size_t site) const {
   double sum = -lambda_[site][0];
@@ -55,7 +58,8 @@ double MomentSites<D>::merit(std::size_t site) const {
       continue;
     }
     const double y = own + lambda_[static_cast<std::size_t>(link.far)].dot(phi_[link.far_slot]);
-    sum += 0.5 * link.weight * (1 + y > least_factor ? y + 0.5 * y * y : least_factor * y - 0.5 * (1 - least_factor) * (1 - least_factor));
+    const double f = std::clamp(1 + y, least_factor, most_);
+    sum += 0.5 * link.weight * (f == 1 + y ? y + 0.5 * y * y : f * y - 0.5 * (f - 1) * (f - 1));
   }
   return sum;
 }
@@ -73,7 +77,7 @@ auto MomentSites<D>::residual(std::size_t site) const -> Moments {
 }
 
 /// Method of multipliers around Newton's method: R(lambda) + shift S (lambda - lambda_0) = 0, S the curvatures of all factors that are to be found, then lambda_0 <- lambda. After the first step,
-/// of a large shift, sites that cannot have their moments stay with that shift and lambda_0 = 0. A large system is solved roughly, by stabilised biconjugate gradients, and for the first step alone.
+/// of a large shift, sites that cannot have their moments stay with that shift and lambda_0 = 0. Large systems go down by steps.
 template <int D>
 void MomentSites<D>::solve() {
   const std::size_t n = size();
@@ -91,6 +95,10 @@ void MomentSites<D>::solve() {
     curvature[k] = found[k] ? Moments(scale[k].array() + 1e-2 * scale[k].maxCoeff()) : Moments::Ones();
     scale[k] = first_multiplier_shift * curvature[k];
   }
+  if (!small) {
+    descend(curvature, found);
+    return;
+  }
   const auto over_sites = [&](auto body) { parallel_for(n, body); };
   // rest <- R + shift S (lambda - lambda_0), and the convex function that this is the derivative of.
   std::vector<double> merits(n);
@@ -102,21 +110,21 @@ void MomentSites<D>::solve() {
     });
     return std::accumulate(merits.begin(), merits.end(), 0.0);
   };
-  for (int outer = 0; outer < (small ? most_steps : 1); ++outer) {
+  for (int outer = 0; outer < most_steps; ++outer) {
     double value = evaluate(), last = std::numeric_limits<double>::infinity();
     for (int round = 0; round < most_rounds; ++round) {
       double error = 0;
       for (const Moments& r : rest) error = std::max(error, r.cwiseAbs().maxCoeff());
-      if (error <= (small ? 0.5 * moment_rounding : 1e-5) || (error <= 1e-9 && error > 0.5 * last)) break;
+      if (error <= 0.5 * moment_rounding || (error <= 1e-9 && error > 0.5 * last)) break;
       last = error;
       over_sites([&](std::size_t k) {
         for (std::size_t b = first_[k]; b < first_[k + 1]; ++b) {
           const Link& link = links_[b];
-          free[b] = link.fixed == 0 && factor(k, link.own_slot, static_cast<std::size_t>(link.far), link.far_slot) > least_factor;
+          const double f = factor(k, link.own_slot, static_cast<std::size_t>(link.far), link.far_slot);
+          free[b] = link.fixed == 0 && f > least_factor && f < most_;
         }
       });
-      if (small) solve_at_once(free, scale, rest, step);
-      else solve_roughly(free, scale, rest, 0.1 * error, step);
+      solve_at_once(free, scale, rest, step);
       before = lambda_;
       double slope = 0, length = 1, after = 0;
       for (std::size_t k = 0; k < n; ++k) slope += count_[k] * rest[k].dot(step[k]);
@@ -170,68 +178,72 @@ void MomentSites<D>::solve_at_once(const std::vector<std::uint8_t>& free, const 
   ++iterations_;
 }
 
-/// The same until the largest component of what is left of `rest` is `wanted`.
+/// Accelerated descent in the norm of the blocks on the diagonal, as in moment_points.hpp. Counts of sites are weights of the function, and of the blocks with it.
 template <int D>
-void MomentSites<D>::solve_roughly(const std::vector<std::uint8_t>& free, const std::vector<Moments>& scale, const std::vector<Moments>& rest, double wanted, std::vector<Moments>& step) {
+void MomentSites<D>::descend(const std::vector<Moments>& curvature, const std::vector<std::uint8_t>& found) {
   const std::size_t n = size();
-  using Vector = std::vector<Moments>;
+  // With as many components as fill registers.
+  using Padded = Eigen::Matrix<double, (moments + 7) / 8 * 8, 1>;
   using Block = Eigen::Matrix<double, moments, moments>;
-  std::vector<Eigen::LDLT<Block>> inverse(n);
-  parallel_for(n, [&](std::size_t k) {
-    Block block = scale[k].asDiagonal();
-    for (std::size_t b = first_[k]; b < first_[k + 1]; ++b)
-      if (free[b]) block += links_[b].weight * phi_[links_[b].own_slot] * phi_[links_[b].own_slot].transpose();
-    inverse[k].compute(block);
-  });
-  const auto apply = [&](const Vector& x, Vector& y) {
+  const auto pad = [](const Moments& moments_of) {
+    Padded padded = Padded::Zero();
+    padded.template head<moments>() = moments_of;
+    return padded;
+  };
+  std::vector<Padded> phi, at(n, Padded::Zero()), next(n), x(n, Padded::Zero());
+  for (const Moments& polynomials_of : phi_) phi.push_back(pad(polynomials_of));
+  std::vector<Moments> pull(n);
+  std::vector<Block> inverse(n);
+  std::vector<double> along(n);
+  const auto set_blocks = [&] {
     parallel_for(n, [&](std::size_t k) {
-      Moments sum = scale[k].cwiseProduct(x[k]);
-      for (std::size_t b = first_[k]; b < first_[k + 1]; ++b) {
-        if (!free[b]) continue;
-        const Link& link = links_[b];
-        const double value = x[k].dot(phi_[link.own_slot]) + x[static_cast<std::size_t>(link.far)].dot(phi_[link.far_slot]);
-        sum += link.weight * value * phi_[link.own_slot];
-      }
-      y[k] = sum;
+      Block block = (pull[k] + Moments::Constant(1e-3 * curvature[k].maxCoeff())).asDiagonal();
+      for (std::size_t b = first_[k]; b < first_[k + 1]; ++b)
+        if (links_[b].fixed == 0) block += links_[b].weight * phi_[links_[b].own_slot] * phi_[links_[b].own_slot].transpose();
+      inverse[k] = block.llt().solve(Block::Identity());
     });
   };
-  const auto precondition = [&](const Vector& x, Vector& y) { parallel_for(n, [&](std::size_t k) { y[k] = inverse[k].solve(x[k]); }); };
-  const auto dot = [&](const Vector& a, const Vector& b) {
-    double sum = 0;
-    for (std::size_t k = 0; k < n; ++k) sum += a[k].dot(b[k]);
-    return sum;
-  };
-  const auto largest = [](const Vector& a) {
-    double most = 0;
-    for (const Moments& m : a) most = std::max(most, m.cwiseAbs().maxCoeff());
-    return most;
-  };
-  const Vector zero(n, Moments::Zero());
-  Vector r = rest, p = zero, v = zero, s = zero, t = zero, z = zero, q = zero;
-  const Vector shadow = rest;
-  step = zero;
-  double rho = 1, alpha = 1, omega = 1;
-  for (int k = 0; k < most_products / 2 && largest(r) > wanted; ++k, iterations_ += 2) {
-    const double next = dot(shadow, r);
-    if (next == 0 || omega == 0) break;
-    const double beta = next / rho * (alpha / omega);
-    rho = next;
-    for (std::size_t i = 0; i < n; ++i) p[i] = r[i] + beta * (p[i] - omega * v[i]);
-    precondition(p, z);
-    apply(z, v);
-    const double along = dot(shadow, v);
-    if (along == 0) break;
-    alpha = rho / along;
-    for (std::size_t i = 0; i < n; ++i) s[i] = r[i] - alpha * v[i];
-    precondition(s, q);
-    apply(q, t);
-    const double square = dot(t, t);
-    omega = square > 0 ? dot(t, s) / square : 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      step[i] += alpha * z[i] + omega * q[i];
-      r[i] = s[i] - omega * t[i];
+  const auto residual_at = [&](std::size_t k) {
+    Padded sum = Padded::Zero();
+    for (std::size_t b = first_[k]; b < first_[k + 1]; ++b) {
+      const Link& link = links_[b];
+      const Padded& own = phi[link.own_slot];
+      const double f = link.fixed > 0 ? link.fixed : std::clamp(1 + (at[k].dot(own) + at[static_cast<std::size_t>(link.far)].dot(phi[link.far_slot])), least_factor, most_);
+      sum += (link.weight * f) * own;
     }
+    sum[0] -= 1;
+    return Moments(sum.template head<moments>());
+  };
+  for (std::size_t k = 0; k < n; ++k) pull[k] = first_multiplier_shift * curvature[k];
+  set_blocks();
+  const int steps = static_cast<int>(std::clamp(most_links / static_cast<double>(links_.size()), 2.0 * first_steps, 1000.0));
+  double momentum = 1;
+  for (int step = 0; step < steps; ++step, ++iterations_) {
+    if (step == first_steps) {
+      // Sites that cannot have their moments stay near 0.
+      parallel_for(n, [&](std::size_t k) {
+        if (residual_at(k).cwiseAbs().maxCoeff() <= first_allowed) pull[k].setZero();
+      });
+      set_blocks();
+    }
+    const double later = 0.5 * (1 + std::sqrt(1 + 4 * momentum * momentum)), share = (momentum - 1) / later;
+    parallel_for(n, [&](std::size_t k) {
+      if (!found[k]) {
+        next[k] = Padded::Zero();
+        along[k] = 0;
+        return;
+      }
+      const Moments r = residual_at(k) + pull[k].cwiseProduct(at[k].template head<moments>());
+      const Padded reached = at[k] - pad(Moments(inverse[k] * r / 1.5)), moved = reached - x[k];
+      along[k] = -count_[k] * r.dot(moved.template head<moments>());
+      x[k] = reached;
+      next[k] = reached + share * moved;
+    });
+    at.swap(next);
+    momentum = std::accumulate(along.begin(), along.end(), 0.0) < 0 ? 1 : later;
   }
+  for (std::size_t k = 0; k < n; ++k) lambda_[k] = x[k].template head<moments>();
+  parallel_for(n, [&](std::size_t k) { error_[k] = residual(k).cwiseAbs().maxCoeff(); });
 }
 
 template class MomentSites<1>;

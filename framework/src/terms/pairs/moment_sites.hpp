@@ -1,9 +1,9 @@
 #pragma once
 /// Bond factors of least change under conditions on fourth moments, on the bonds of a lattice. Points that see the same of the body are one site. At each site
 ///
-///   R_s = sum_b w_b f_b phi(n_b) - e_0 = 0,   f_b = max(floor, 1 + lambda_s . phi(n_b) + lambda_far . phi(n_b)),
+///   R_s = sum_b w_b f_b phi(n_b) - e_0 = 0,   f_b = 1 + lambda_s . phi(n_b) + lambda_far . phi(n_b), not below the floor nor above the ceiling,
 ///
-/// phi the even polynomials of a direction (moment_basis.hpp): the f_b >= floor with the least sum of w_b (f_b - 1)^2 that have these moments, lambda being the
+/// phi the even polynomials of a direction (moment_basis.hpp): the f_b within these bounds with the least sum of w_b (f_b - 1)^2 that have these moments, lambda being the
 /// multipliers. Where no f has them, those with the least sum of R^2 are found.
 
 #include <Eigen/Dense>
@@ -30,8 +30,8 @@ class MomentSites {
     double fixed;            ///< f_b where it is known; 0: it is to be found
   };
 
-  /// directions: n of the slots that links name.
-  explicit MomentSites(std::span<const std::array<double, D>> directions);
+  /// directions: n of the slots that links name; most: no factor is above.
+  MomentSites(std::span<const std::array<double, D>> directions, double most);
   /// The sites one after the other; links may name sites that come later. count: in how many places a site lies, as often as far ends count it.
   void add(std::span<const Link> links, double count = 1);
   std::size_t size() const noexcept { return first_.size() - 1; }
@@ -51,8 +51,9 @@ class MomentSites {
   Moments residual(std::size_t site) const;
   double merit(std::size_t site) const;
   void solve_at_once(const std::vector<std::uint8_t>& free, const std::vector<Moments>& scale, const std::vector<Moments>& rest, std::vector<Moments>& step);
-  void solve_roughly(const std::vector<std::uint8_t>& free, const std::vector<Moments>& scale, const std::vector<Moments>& rest, double wanted, std::vector<Moments>& step);
+  void descend(const std::vector<Moments>& curvature, const std::vector<std::uint8_t>& found);
 
+  double most_;
   std::vector<Moments> phi_;
   std::vector<Link> links_;
   std::vector<std::size_t> first_{0};

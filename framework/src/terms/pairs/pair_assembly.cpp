@@ -59,14 +59,14 @@ void PairAssembly<D>::moduli(std::size_t row, Memory& m) const {
   const std::size_t p = rows_.point(row);
   for (std::size_t k = 0; k < neighbours.size(); ++k) {
     const std::size_t q = rows_.point(static_cast<std::size_t>(neighbours[k]));
-    m.modulus[k] = fields.factors.of(rows_.families(), p, q) * fields.of_bond(p, q);
+    m.modulus[k] = fields.factors->of(rows_.families(), p, q) * fields.of_bond(p, q);
   }
 }
 
 /// omega |xi| f of the dilatation.
 template <int D>
 double PairAssembly<D>::dilatation_weight(const Memory& m, std::size_t p, std::size_t q, std::size_t k) const {
-  const BondFactors& factors = points_.fields.factors;
+  const BondFactors& factors = *points_.fields.factors;
   return (factors.of_dilatation ? factors.of(rows_.families(), p, q) : 1.0) * m.omega[k] * m.family.length[k];
 }
 

@@ -15,15 +15,11 @@ namespace perikit {
 
 template <int D>
 PairForces<D>::PairForces(const PairParts& parts)
-    : families_(parts.families), body_(families_.body()), laws_(parts.laws), interfaces_(parts.interfaces), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share) {
+    : families_(parts.families), body_(families_.body()), laws_(parts.laws), interfaces_(parts.interfaces), formulation_(parts.formulation), law_(*formulation_.pairs), share_(parts.share), factors_(parts.factors) {
   if (formulation_.dilatation) {
     for (Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_}) *field = body_.make_field(1);
   }
-  switch (formulation_.pair_traits.factors) {
-    case BondFactorsOf::none: break;
-    case BondFactorsOf::energy: fields_.factors = energy_factors<D>(families_, law_, laws_); break;
-    case BondFactorsOf::moments: fields_.factors = moment_factors<D>(families_, law_, parts.copies); break;
-  }
+  fields_.factors = factors_.get();
   Field modulus = body_.make_field(1);
   FamilyArrays family;
   families_.each_class([&](std::span<const std::int32_t> points) {
@@ -111,16 +107,16 @@ void PairForces<D>::warn(const PairPoint& x, const MaterialRecord& record) {
 template <int D>
 void PairForces<D>::set_moduli(const FamilyArrays& family, std::span<const std::int32_t> points, Field& modulus) {
   const double intact = 1 - families_.damage(static_cast<std::size_t>(points[0]));
-  const bool own_factors = fields_.factors.of_dilatation;   // which points with equal families need not have alike
+  const bool own_factors = fields_.factors->of_dilatation;   // which points with equal families need not have alike
   FamilyArrays own;
   double m = 0;
   PairModuli moduli;
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto p = static_cast<std::size_t>(points[k]);
-    const bool anew = k == 0 || (own_factors && !fields_.factors.same(static_cast<std::size_t>(points[k - 1]), p));
+    const bool anew = k == 0 || (own_factors && !fields_.factors->same(static_cast<std::size_t>(points[k - 1]), p));
     if (anew) {
       if (k > 0) families_.load(p, BondsOf::uncut, own);
-      m = fields_.factors.weighted_volume(families_, p, k > 0 ? own : family);
+      m = fields_.factors->weighted_volume(families_, p, k > 0 ? own : family);
     }
     if (m > 0 && (anew || !laws_.single())) {
       PairPoint x = point(p);
@@ -157,9 +153,9 @@ void PairForces<D>::load_bonds(std::size_t p, ConstFieldView u, Bonds& bonds) co
     bonds.omega[k] = family.whole_omega(k);
     bonds.extension[k] = bond_stretch(family, k, p, u) * family.length[k];
     double& modulus = bonds.modulus[k];
-    bonds.factor[k] = fields_.factors.of(families_, p, far);
+    bonds.factor[k] = fields_.factors->of(families_, p, far);
     modulus = bonds.factor[k] * fields_.of_bond(p, far);
-    if (!fields_.factors.of_dilatation) bonds.factor[k] = 1;
+    if (!fields_.factors->of_dilatation) bonds.factor[k] = 1;
   }
   law_.bond_law({family.bonds, family.length.data(), bonds.omega.data(), bonds.extension.data(), bonds.modulus.data(),
                  bonds.energy.data(), bonds.force.data(), nullptr});
@@ -379,7 +375,7 @@ void PairForces<D>::report(ModelReport& report) const {
   report.resting += loop_->resting_counts();
   for (const Field* field : {&scale_, &dilatation_modulus_, &theta_, &q_, &rate_, &fields_.modulus, &density_, &by_theta_})
     report.bytes += field->bytes();
-  fields_.factors.report(report);
+  fields_.factors->report(report);
   report.warnings.insert(report.warnings.end(), warnings_.begin(), warnings_.end());
   report.skips.push_back({"deformation gradients and stresses in forces", "pair law", "shape tensors, one material evaluation a point or bond"});
   if (share_) report.skips.push_back(second_evaluation(families_.bonds(), "both ends feel opposite forces"));

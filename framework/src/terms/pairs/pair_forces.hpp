@@ -17,7 +17,7 @@ struct PairParts {
   bool skip = true, share = true;
   std::shared_ptr<const Interfaces> interfaces;   ///< across these bonds are springs in series; null: nowhere
   std::shared_ptr<const Images> images;           ///< of points of the body; null: none
-  PointCopies copies;
+  std::shared_ptr<const BondFactors> factors;     ///< of the bonds; never null
 };
 
 /// Any pair law on any body: one loop over bonds, or two where the law has a dilatation.
@@ -87,6 +87,7 @@ class PairForces final : public Term, public AssembledTerm, public SampledTerm, 
   const Formulation& formulation_;
   const PairKinematics& law_;
   bool share_;
+  std::shared_ptr<const BondFactors> factors_;
   PairFields fields_;
   std::unique_ptr<PairLoop> loop_;
   Field scale_;                  ///< d/m_i; 0 without bonds

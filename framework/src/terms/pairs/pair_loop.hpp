@@ -46,7 +46,7 @@ struct PairPass {
 struct PairFields {
   Field modulus;                  ///< c_i; empty where `uniform` holds
   double uniform = 0;
-  BondFactors factors;
+  const BondFactors* factors = nullptr;   ///< of the bonds; never null in a loop
   // Near interfaces between materials; else empty.
   std::vector<std::uint8_t> near; ///< by group of eight points
   Field sides;                    ///< see Side
