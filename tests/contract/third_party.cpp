@@ -53,6 +53,14 @@ struct TextbookRubber {
   }
 };
 
+/// k <- lambda, mu and a constant of the law's own.
+void elastic_constants_and(const MaterialInput& input, const char* further, double* k) {
+  const Moduli moduli = elastic_constants(input);
+  k[0] = moduli.lambda;
+  k[1] = moduli.mu;
+  k[2] = input.value(further);
+}
+
 /// An elastic law that counts its steps, and takes none in which its strain changes by more than it is made for.
 struct Careful {
   static constexpr MaterialTraits traits{.constants = 3, .hyperelastic = false, .limits_step = true};
@@ -62,10 +70,7 @@ struct Careful {
   static constexpr int size = components_of(state<S>);
 
   void constants(const MaterialInput& input, double* k) const {
-    const Moduli moduli = elastic_constants(input);
-    k[0] = moduli.lambda;
-    k[1] = moduli.mu;
-    k[2] = input.value("largest_change");
+    elastic_constants_and(input, "largest_change", k);
   }
   Moduli small_strain(const double* k) const noexcept { return {k[0], k[1]}; }
 
@@ -110,10 +115,7 @@ struct Warm {
   static constexpr std::array external{ExternalVariable{"temperature", "K", 300.0}};
 
   void constants(const MaterialInput& input, double* k) const {
-    const Moduli moduli = elastic_constants(input);
-    k[0] = moduli.lambda;
-    k[1] = moduli.mu;
-    k[2] = input.value("expansion");
+    elastic_constants_and(input, "expansion", k);
   }
   Moduli small_strain(const double* k) const noexcept { return {k[0], k[1]}; }
   template <class T, class S, class K>

@@ -5,7 +5,7 @@
 ///   f_ij = 1 + (lambda_i + lambda_j) . phi(n_ij) + rho_ij (mu_i - mu_j) . psi(n_ij), not below the floor nor above the ceiling, or what is known of a bond,
 ///
 /// phi and psi the even and odd polynomials of a direction (moment_basis.hpp), w_ij = V_j w(|xi|, omega)/t. Newton's method around the method of multipliers, R(x) + shift S (x - x_0) = 0, S the curvatures, then
-/// x_0 <- x. Conjugate gradients in single precision solve for a step; what they leave is found in double precision.
+/// x_0 <- x, after an accelerated descent. Steps of both are found in packs P, of doubles or of singles; what they leave is found in doubles.
 
 #include <algorithm>
 #include <cmath>
@@ -70,7 +70,7 @@ class MomentPoints {
   Pack factors(std::size_t p, std::int64_t bond, const std::int32_t* far) const noexcept {
     Pack phi[even_moments<D>], psi[odd_moments<D>];
     directions_(p, bond, far, phi, psi);
-    return min(Pack(most_factor), max(Pack(least_factor), Pack(1.0) + value(p, far, phi, psi)));
+    return bounded(value(p, far, phi, psi));
   }
   /// Largest error of a moment of a point that is asked.
   double error(std::size_t p) const noexcept {
@@ -93,6 +93,12 @@ class MomentPoints {
   static constexpr int columns = 4 * static_cast<int>(rows_of_point);
 
   Field make() const { return body_.make_field(moments); }
+  /// f of 1 + y.
+  template <class Q>
+  [[gnu::always_inline]] static Q bounded(Q y) noexcept {
+    using Lane = typename LanesOf<Q>::Number;
+    return min(Q(Lane(most_factor)), max(Q(Lane(least_factor)), Q(Lane(1)) + y));
+  }
   bool asked(std::size_t p, int k) const noexcept { return k < even || bonds_.inside[p]; }
   /// Numbers that a product passes.
   double work() const noexcept { return static_cast<double>(moments) * static_cast<double>(count_); }
@@ -172,33 +178,23 @@ class MomentPoints {
     for (int k = 0; k < odd; ++k) sum += Pack(multiplier(p, even + k)) * psi[k];
     return sum;
   }
-  /// visit(bond, far, n) for the bonds of point k, `at_once` at a time, of which there are n.
+  /// visit(bond, far, n, at) for the bonds of point k, `at_once` at a time, of which there are n, from number `at` of the point on. Of packs of singles lanes beyond may be bonds of the next point.
   template <int at_once, class Visit>
   [[gnu::always_inline]] void each_pack(std::size_t k, const Visit& visit) const {
     std::int32_t far[at_once];
     for (std::int64_t b = bonds_.begin[k]; b < bonds_.end[k]; b += at_once) {
-      const int n = static_cast<int>(std::min<std::int64_t>(at_once, bonds_.end[k] - b));
-      std::copy_n(bonds_.far + b, n, far);
-      std::fill(far + n, far + at_once, far[0]);
-      visit(b, far, n);
-    }
-  }
-  /// visit(bond, far, n, part) likewise, of packs P, whose lanes beyond may be bonds of the next point; part: of the sums of lanes.
-  template <class Visit>
-  [[gnu::always_inline]] void each_single_pack(std::size_t k, const Visit& visit) const {
-    for (std::int64_t b = bonds_.begin[k]; b < bonds_.end[k]; b += width) {
-      const int n = static_cast<int>(std::min<std::int64_t>(width, bonds_.end[k] - b));
-      const int part = parts == 1 ? 0 : static_cast<int>((b - bonds_.begin[k]) / width % parts);
-      if (!exact && b + width <= static_cast<std::int64_t>(free_.size()) - width) {
-        visit(b, bonds_.far + b, n, part);
+      const int n = static_cast<int>(std::min<std::int64_t>(at_once, bonds_.end[k] - b)), at = static_cast<int>(b - bonds_.begin[k]);
+      if (!exact && at_once == width && b + width <= static_cast<std::int64_t>(free_.size()) - width) {
+        visit(b, bonds_.far + b, n, at);
         continue;
       }
-      std::int32_t far[width];
       std::copy_n(bonds_.far + b, n, far);
-      std::fill(far + n, far + width, far[0]);
-      visit(b, far, n, part);
+      std::fill(far + n, far + at_once, far[0]);
+      visit(b, far, n, at);
     }
   }
+  /// Of the sums of lanes, for bonds from number `at` of a point on.
+  static constexpr std::size_t part_of(int at) noexcept { return static_cast<std::size_t>(at / width % parts); }
   /// Of four columns of sums.
   template <std::size_t size>
   static Four total_of(const P (&sums)[static_cast<std::size_t>(parts)][size], std::size_t first) noexcept {
@@ -227,14 +223,13 @@ class MomentPoints {
       const double volume = body_.volume(p), relative = volume / volume_unit_;
       Pack phi[even_moments<D>], psi[odd_moments<D>];
       EightSums sums[static_cast<std::size_t>(moments)], values;
-      each_pack<pack_width>(k, [&](std::int64_t bond, const std::int32_t* far, int n) {
+      each_pack<pack_width>(k, [&](std::int64_t bond, const std::int32_t* far, int n, int at) {
         directions_(p, bond, far, phi, psi);
         const Pack y = value(p, far, phi, psi), w = keep(first_lanes(n), Pack::load(bonds_.weight + bond)), floor(least_factor), ceiling(most_factor);
-        const Pack known = bonds_.known ? Pack::load(bonds_.known + bond) : Pack(0.0), found = min(ceiling, max(floor, Pack(1.0) + y)), f = select(known > Pack(0.0), known, found);
+        const Pack known = bonds_.known ? Pack::load(bonds_.known + bond) : Pack(0.0), found = bounded(y), f = select(known > Pack(0.0), known, found);
         const Pack moves = Pack(relative) * select((((found > floor) & (found < ceiling)) | (bonds == Bonds::all)) & (known <= Pack(0.0)), w, Pack(0.0));
         for (int l = 0; l < n; ++l) free_[static_cast<std::size_t>(bond + l)] = static_cast<Number>(moves[l]);
         const Pack weighted = w * f;
-        const int at = static_cast<int>(bond - bonds_.begin[k]);
         PERIKIT_UNROLL for (int c = 0; c < even; ++c) sums[c].at(at) += weighted * phi[c];
         PERIKIT_UNROLL for (int c = 0; c < odd; ++c) sums[even + c].at(at) += weighted * psi[c];
         // Half of w H(y), H' = f, for bonds whose other half the other end has.
@@ -378,14 +373,14 @@ class MomentPoints {
       }
       const auto p = static_cast<std::size_t>(bonds_.points[k]);
       P sums[static_cast<std::size_t>(parts)][(entries + 3) / 4 * 4] = {};
-      each_single_pack(k, [&](std::int64_t bond, const std::int32_t* far, int n, int part) {
+      each_pack<width>(k, [&](std::int64_t bond, const std::int32_t* far, int n, int first) {
         Phi phi;
         Psi psi;
         directions_(p, bond, far, phi, psi);
         const P w = keep_first(n, P::load(free_.data() + bond));
         for (int a = 0; a < moments; ++a) {
           const P weighted = w * (a < even ? phi[a] : psi[a - even]);
-          for (int b = 0; b <= a; ++b) sums[part][entry(a, b)] = multiply_add(weighted, b < even ? phi[b] : psi[b - even], sums[part][entry(a, b)]);
+          for (int b = 0; b <= a; ++b) sums[part_of(first)][entry(a, b)] = multiply_add(weighted, b < even ? phi[b] : psi[b - even], sums[part_of(first)][entry(a, b)]);
         }
       });
       for (std::size_t e = 0; e < entries; e += 4) {
@@ -558,7 +553,7 @@ class MomentPoints {
     const auto p = static_cast<std::size_t>(bonds_.points[k]);
     const Four* const own = direction_.data() + p * rows_of_point;
     P sums[static_cast<std::size_t>(parts)][static_cast<std::size_t>(columns)] = {};
-    each_single_pack(k, [&](std::int64_t bond, const std::int32_t* far, int n, int part) {
+    each_pack<width>(k, [&](std::int64_t bond, const std::int32_t* far, int n, int first) {
       Phi phi;
       Psi psi;
       directions_(p, bond, far, phi, psi);
@@ -572,9 +567,9 @@ class MomentPoints {
         }
       }
       const P w = keep_first(n, P::load(free_.data() + bond));
-      y = whole ? w * min(P(Number(most_factor)), max(P(Number(least_factor)), P(Number(1)) + y)) : w * y;
-      PERIKIT_UNROLL for (int c = 0; c < even; ++c) sums[part][c] = multiply_add(y, phi[c], sums[part][c]);
-      PERIKIT_UNROLL for (int c = 0; c < odd; ++c) sums[part][even + c] = multiply_add(y, psi[c], sums[part][even + c]);
+      y = whole ? w * bounded(y) : w * y;
+      PERIKIT_UNROLL for (int c = 0; c < even; ++c) sums[part_of(first)][c] = multiply_add(y, phi[c], sums[part_of(first)][c]);
+      PERIKIT_UNROLL for (int c = 0; c < odd; ++c) sums[part_of(first)][even + c] = multiply_add(y, psi[c], sums[part_of(first)][even + c]);
     });
     double product = 0;
     for (std::size_t r = 0; r < rows_of_point; ++r) {

@@ -43,7 +43,7 @@ template <int D>
 double MomentSites<D>::factor(std::size_t site, std::size_t own_slot, std::size_t far, std::size_t far_slot) const noexcept {
   // The two products first: the sum is the same from both ends.
   const double own = lambda_[site].dot(phi_[own_slot]), other = lambda_[far].dot(phi_[far_slot]);
-  return std::clamp(1 + (own + other), least_factor, most_);
+  return bounded(own + other);
 }
 
 /// Half of sum_b w_b H(y_b), H' = f, for bonds whose other half the other end has; less what is asked for.
@@ -58,7 +58,7 @@ double MomentSites<D>::merit(std::size_t site) const {
       continue;
     }
     const double y = own + lambda_[static_cast<std::size_t>(link.far)].dot(phi_[link.far_slot]);
-    const double f = std::clamp(1 + y, least_factor, most_);
+    const double f = bounded(y);
     sum += 0.5 * link.weight * (f == 1 + y ? y + 0.5 * y * y : f * y - 0.5 * (f - 1) * (f - 1));
   }
   return sum;
@@ -208,7 +208,7 @@ void MomentSites<D>::descend(const std::vector<Moments>& curvature, const std::v
     for (std::size_t b = first_[k]; b < first_[k + 1]; ++b) {
       const Link& link = links_[b];
       const Padded& own = phi[link.own_slot];
-      const double f = link.fixed > 0 ? link.fixed : std::clamp(1 + (at[k].dot(own) + at[static_cast<std::size_t>(link.far)].dot(phi[link.far_slot])), least_factor, most_);
+      const double f = link.fixed > 0 ? link.fixed : bounded(at[k].dot(own) + at[static_cast<std::size_t>(link.far)].dot(phi[link.far_slot]));
       sum += (link.weight * f) * own;
     }
     sum[0] -= 1;

@@ -7,6 +7,7 @@
 /// multipliers. Where no f has them, those with the least sum of R^2 are found.
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -48,6 +49,8 @@ class MomentSites {
   int iterations() const noexcept { return iterations_; }
 
  private:
+  /// f of 1 + y.
+  double bounded(double y) const noexcept { return std::clamp(1 + y, least_factor, most_); }
   Moments residual(std::size_t site) const;
   double merit(std::size_t site) const;
   void solve_at_once(const std::vector<std::uint8_t>& free, const std::vector<Moments>& scale, const std::vector<Moments>& rest, std::vector<Moments>& step);
