@@ -6,7 +6,7 @@ namespace perikit {
 
 namespace {
 
-constexpr double most = 0.98;       // ratio: slower ones may be no series that ends
+constexpr double most = 0.999;      // ratio: slower ones may be no series that ends
 constexpr double cautious = 0.5;    // share of what is still to come
 
 }  // namespace

@@ -62,7 +62,7 @@ PartDescription description() {
   part.parameters.choice("surface_correction", {"none", "energy", "moments"},
                          "factors on the bonds. \"none\": sums over bonds as they are, as in the papers; \"energy\": of bonds near surfaces, so that a homogeneous stretch along an axis stores as much as inside; "
                          "\"moments\": of all bonds, so that uniform strains have the energy of the material, inside and near surfaces, and are in equilibrium inside of clouds")
-      .by_default("\"none\"");
+      .by_default("\"moments\"");
   return part;
 }
 

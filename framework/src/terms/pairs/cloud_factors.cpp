@@ -11,7 +11,7 @@ namespace perikit {
 
 namespace {
 
-constexpr std::int64_t most_bonds_in_doubles = 2'000'000;
+constexpr double most_bonds_in_doubles = 2e6;
 
 /// Of the directions from one point to others.
 template <int D>
@@ -76,16 +76,13 @@ void cloud_factors(const Families& families, const PairKinematics& law, const Mo
   AlignedVector<double> weights(lists.neighbour.size() + padding, 0.0);
   out.by_bond.assign(lists.neighbour.size() + padding, 1.0);
   MomentBonds bonds;
-  std::int64_t count = 0;
   for (const std::int32_t i : body.owned()) {
     const auto p = static_cast<std::size_t>(i);
     if (lists.first[p] == lists.first[p + 1]) continue;
     bonds.points.push_back(i);
     bonds.begin.push_back(lists.first[p]);
     bonds.end.push_back(lists.first[p + 1]);
-    count += lists.first[p + 1] - lists.first[p];
   }
-  communicator().sum({&count, 1});
   over_blocks(bonds.points.size(), [&](std::size_t first, std::size_t last) {
     FamilyArrays family;
     AlignedVector<double> weight, omega;
@@ -124,7 +121,8 @@ void cloud_factors(const Families& families, const PairKinematics& law, const Mo
       for (std::int64_t b = lists.first[p]; b < lists.first[p + 1]; ++b) found.add(out.by_bond[static_cast<std::size_t>(b)]);
     }
   };
-  // Steps in single precision take half of the time, and differ in the seventh digit with the order of the points.
+  // Steps in single precision take half of the time, and differ in the seventh digit with the order of the points. Counted so that a part of a body that is set up alone has the arrays that it has among others.
+  const double count = static_cast<double>(target.weight.size()) * static_cast<double>(body.points_of_all_ranks());
   if (count > most_bonds_in_doubles) find(MomentPoints<D, true, Directions<D>, SinglePack>(body, bonds, copies, Directions<D>(body)));
   else find(MomentPoints<D, true, Directions<D>, Pack>(body, bonds, copies, Directions<D>(body)));
   judge_factors(body, found, out);

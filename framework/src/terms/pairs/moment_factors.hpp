@@ -28,7 +28,7 @@ inline constexpr double most_factor = 10;
 /// Of the method of multipliers, over curvatures: of the first step, which tells points that can have their moments from those that cannot, and of the later ones.
 inline constexpr double first_multiplier_shift = 1e-2, later_multiplier_shift = 1e-6;
 /// Points whose moments are still off by more than this after the first step cannot have them, and sites of lattices that are off by more than the second after a later one.
-inline constexpr double first_allowed = 3e-2, later_allowed = 1e-3;
+inline constexpr double first_allowed = 5e-2, later_allowed = 1e-3;
 /// Points whose moments are off by more than this are counted.
 inline constexpr double moment_tolerance = 1e-9;
 

@@ -72,11 +72,9 @@ class MomentPoints {
     directions_(p, bond, far, phi, psi);
     return bounded(value(p, far, phi, psi));
   }
-  /// Largest error of a moment of a point that is asked.
+  /// Error of the moments of a point that is asked, the root of the sum of their squares: the same however the axes are turned.
   double error(std::size_t p) const noexcept {
-    double most = 0;
-    for (int k = 0; k < moments; ++k) most = std::max(most, std::abs(rest_.component(k)[p]) / body_.volume(p));
-    return most;
+    return norm(p, [&](int k) { return rest_.component(k)[p]; });
   }
 
  private:
@@ -93,6 +91,13 @@ class MomentPoints {
   static constexpr int columns = 4 * static_cast<int>(rows_of_point);
 
   Field make() const { return body_.make_field(moments); }
+  /// Of values of all moments of a point, times its volume.
+  template <class Of>
+  double norm(std::size_t p, const Of& of) const noexcept {
+    double squares = 0;
+    for (int k = 0; k < moments; ++k) squares += of(k) * of(k);
+    return std::sqrt(squares) / body_.volume(p);
+  }
   /// f of 1 + y.
   template <class Q>
   [[gnu::always_inline]] static Q bounded(Q y) noexcept {
@@ -265,11 +270,7 @@ class MomentPoints {
     if (since_blocks_ < iterations_) set_blocks();
     double before = merit(), last = std::numeric_limits<double>::infinity();
     for (int round = 0; round < most_rounds; ++round) {
-      const double error = largest([&](std::size_t p) {
-        double most = 0;
-        for (int k = 0; k < moments; ++k) most = std::max(most, std::abs(pulled(p, k)) / body_.volume(p));
-        return most;
-      });
+      const double error = largest([&](std::size_t p) { return norm(p, [&](int k) { return pulled(p, k); }); });
       if (error <= rounding_error || (error < 1e-9 && error > 0.5 * last)) return true;
       if (left() == 0) break;
       last = error;
@@ -320,9 +321,8 @@ class MomentPoints {
   double typical_error() const {
     const double squares = total([&](std::size_t i) {
       const auto p = static_cast<std::size_t>(bonds_.points[i]);
-      double sum = 0;
-      for (int k = 0; k < moments; ++k) sum += rest_.component(k)[p] * rest_.component(k)[p];
-      return held_[p] ? 0.0 : sum / (body_.volume(p) * body_.volume(p));
+      const double own = held_[p] ? 0.0 : error(p);
+      return own * own;
     });
     return std::sqrt(squares);
   }
@@ -387,15 +387,16 @@ class MomentPoints {
         const Four four = total_of(sums, e);
         for (std::size_t i = 0; i < 4 && e + i < entries; ++i) at(e + i, l) = four[i];
       }
-      // A polynomial that vanishes along all these bonds has no curvature.
-      Number most = 0;
-      for (int a = 0; a < moments; ++a) most = std::max(most, at(entry(a, a), l));
+      // Means over all directions of a polynomial: the same however the axes are turned.
+      Number means[2] = {0, 0};
+      for (int a = 0; a < moments; ++a) means[a < even ? 0 : 1] += at(entry(a, a), l) / Number(a < even ? even : odd);
+      const Number most = std::max(means[0], means[1]);
       for (int a = 0; a < moments; ++a) {
         if (initial) {
-          curvature_.component(a)[p] = 1e-300 + (static_cast<double>(at(entry(a, a), l)) + 1e-2 * static_cast<double>(most)) * volume_unit_ / body_.volume(p);
+          curvature_.component(a)[p] = 1e-300 + static_cast<double>(means[a < even ? 0 : 1]) * volume_unit_ / body_.volume(p);
           set_pull(p, a);
         }
-        // Single precision has to do for the inverse.
+        // A polynomial that vanishes along all these bonds has no curvature, and single precision has to do for the inverse.
         at(entry(a, a), l) += single(pull_, p, a) + Number(1e-3) * most + Number(1e-30);
         if (asked(p, a)) continue;
         for (int b = 0; b < moments; ++b) at(entry(a, b), l) = a == b ? Number(1) : Number(0);

@@ -84,15 +84,16 @@ void MomentSites<D>::solve() {
   const bool small = n * moments <= most_at_once;
   lambda_.assign(n, Moments::Zero());
   error_.assign(n, 0.0);
-  std::vector<Moments> scale(n), curvature(n), centre(n, Moments::Zero()), rest(n), before(n), step(n);
+  std::vector<double> scale(n), curvature(n);
+  std::vector<Moments> centre(n, Moments::Zero()), rest(n), before(n), step(n);
   std::vector<std::uint8_t> free(links_.size(), 0), found(n), held(n, 0);
   for (std::size_t k = 0; k < n; ++k) {
-    scale[k] = Moments::Constant(1e-300);
+    // The mean over all directions of a polynomial, the same however the axes are turned; a site with nothing to find has none.
+    double mean = 0;
     for (std::size_t b = first_[k]; b < first_[k + 1]; ++b)
-      if (links_[b].fixed == 0) scale[k] += links_[b].weight * phi_[links_[b].own_slot].cwiseAbs2();
-    // A polynomial that vanishes along all these bonds has none, nor has a site with nothing to find.
-    found[k] = scale[k][0] > 1e-200;
-    curvature[k] = found[k] ? Moments(scale[k].array() + 1e-2 * scale[k].maxCoeff()) : Moments::Ones();
+      if (links_[b].fixed == 0) mean += links_[b].weight;
+    found[k] = mean > 0;
+    curvature[k] = found[k] ? mean : 1.0;
     scale[k] = first_multiplier_shift * curvature[k];
   }
   if (!small) {
@@ -105,8 +106,8 @@ void MomentSites<D>::solve() {
   const auto evaluate = [&] {
     over_sites([&](std::size_t k) {
       const Moments moved = lambda_[k] - centre[k];
-      rest[k] = found[k] ? Moments(residual(k) + scale[k].cwiseProduct(moved)) : Moments::Zero();
-      merits[k] = found[k] ? count_[k] * (merit(k) + 0.5 * moved.dot(scale[k].cwiseProduct(moved))) : 0.0;
+      rest[k] = found[k] ? Moments(residual(k) + scale[k] * moved) : Moments::Zero();
+      merits[k] = found[k] ? count_[k] * (merit(k) + 0.5 * scale[k] * moved.squaredNorm()) : 0.0;
     });
     return std::accumulate(merits.begin(), merits.end(), 0.0);
   };
@@ -114,7 +115,7 @@ void MomentSites<D>::solve() {
     double value = evaluate(), last = std::numeric_limits<double>::infinity();
     for (int round = 0; round < most_rounds; ++round) {
       double error = 0;
-      for (const Moments& r : rest) error = std::max(error, r.cwiseAbs().maxCoeff());
+      for (const Moments& r : rest) error = std::max(error, r.norm());
       if (error <= 0.5 * moment_rounding || (error <= 1e-9 && error > 0.5 * last)) break;
       last = error;
       over_sites([&](std::size_t k) {
@@ -137,7 +138,7 @@ void MomentSites<D>::solve() {
     }
     over_sites([&](std::size_t k) {
       rest[k] = residual(k);
-      error_[k] = rest[k].cwiseAbs().maxCoeff();
+      error_[k] = rest[k].norm();
     });
     double left = 0;
     for (std::size_t k = 0; k < n; ++k) {
@@ -157,13 +158,13 @@ void MomentSites<D>::solve() {
 
 /// step <- A^-1 rest, A the derivative of `rest` where the factors `free` move.
 template <int D>
-void MomentSites<D>::solve_at_once(const std::vector<std::uint8_t>& free, const std::vector<Moments>& scale, const std::vector<Moments>& rest, std::vector<Moments>& step) {
+void MomentSites<D>::solve_at_once(const std::vector<std::uint8_t>& free, const std::vector<double>& scale, const std::vector<Moments>& rest, std::vector<Moments>& step) {
   const auto n = static_cast<Eigen::Index>(size());
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n * moments, n * moments);
   Eigen::VectorXd right(n * moments);
   for (Eigen::Index k = 0; k < n; ++k) {
     const auto site = static_cast<std::size_t>(k);
-    A.diagonal().template segment<moments>(k * moments) += scale[site];
+    A.diagonal().template segment<moments>(k * moments).array() += scale[site];
     right.template segment<moments>(k * moments) = rest[site];
     for (std::size_t b = first_[site]; b < first_[site + 1]; ++b) {
       if (!free[b]) continue;
@@ -180,7 +181,7 @@ void MomentSites<D>::solve_at_once(const std::vector<std::uint8_t>& free, const 
 
 /// Accelerated descent in the norm of the blocks on the diagonal, as in moment_points.hpp. Counts of sites are weights of the function, and of the blocks with it.
 template <int D>
-void MomentSites<D>::descend(const std::vector<Moments>& curvature, const std::vector<std::uint8_t>& found) {
+void MomentSites<D>::descend(const std::vector<double>& curvature, const std::vector<std::uint8_t>& found) {
   const std::size_t n = size();
   // With as many components as fill registers.
   using Padded = Eigen::Matrix<double, (moments + 7) / 8 * 8, 1>;
@@ -192,12 +193,12 @@ void MomentSites<D>::descend(const std::vector<Moments>& curvature, const std::v
   };
   std::vector<Padded> phi, at(n, Padded::Zero()), next(n), x(n, Padded::Zero());
   for (const Moments& polynomials_of : phi_) phi.push_back(pad(polynomials_of));
-  std::vector<Moments> pull(n);
+  std::vector<double> pull(n);
   std::vector<Block> inverse(n);
   std::vector<double> along(n);
   const auto set_blocks = [&] {
     parallel_for(n, [&](std::size_t k) {
-      Block block = (pull[k] + Moments::Constant(1e-3 * curvature[k].maxCoeff())).asDiagonal();
+      Block block = (pull[k] + 1e-3 * curvature[k]) * Block::Identity();
       for (std::size_t b = first_[k]; b < first_[k + 1]; ++b)
         if (links_[b].fixed == 0) block += links_[b].weight * phi_[links_[b].own_slot] * phi_[links_[b].own_slot].transpose();
       inverse[k] = block.llt().solve(Block::Identity());
@@ -222,7 +223,7 @@ void MomentSites<D>::descend(const std::vector<Moments>& curvature, const std::v
     if (step == first_steps) {
       // Sites that cannot have their moments stay near 0.
       parallel_for(n, [&](std::size_t k) {
-        if (residual_at(k).cwiseAbs().maxCoeff() <= first_allowed) pull[k].setZero();
+        if (residual_at(k).norm() <= first_allowed) pull[k] = 0;
       });
       set_blocks();
     }
@@ -233,7 +234,7 @@ void MomentSites<D>::descend(const std::vector<Moments>& curvature, const std::v
         along[k] = 0;
         return;
       }
-      const Moments r = residual_at(k) + pull[k].cwiseProduct(at[k].template head<moments>());
+      const Moments r = residual_at(k) + pull[k] * at[k].template head<moments>();
       const Padded reached = at[k] - pad(Moments(inverse[k] * r / 1.5)), moved = reached - x[k];
       along[k] = -count_[k] * r.dot(moved.template head<moments>());
       x[k] = reached;
@@ -243,7 +244,7 @@ void MomentSites<D>::descend(const std::vector<Moments>& curvature, const std::v
     momentum = std::accumulate(along.begin(), along.end(), 0.0) < 0 ? 1 : later;
   }
   for (std::size_t k = 0; k < n; ++k) lambda_[k] = x[k].template head<moments>();
-  parallel_for(n, [&](std::size_t k) { error_[k] = residual(k).cwiseAbs().maxCoeff(); });
+  parallel_for(n, [&](std::size_t k) { error_[k] = residual(k).norm(); });
 }
 
 template class MomentSites<1>;

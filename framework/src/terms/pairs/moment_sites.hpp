@@ -43,7 +43,7 @@ class MomentSites {
   const Moments& polynomials(std::size_t slot) const noexcept { return phi_[slot]; }
   /// f of a bond between two sites.
   double factor(std::size_t site, std::size_t own_slot, std::size_t far, std::size_t far_slot) const noexcept;
-  /// The largest error of a moment of a site.
+  /// Error of the moments of a site, the root of the sum of their squares.
   double error(std::size_t site) const noexcept { return error_[site]; }
   /// Systems and products with matrices that this took.
   int iterations() const noexcept { return iterations_; }
@@ -53,8 +53,8 @@ class MomentSites {
   double bounded(double y) const noexcept { return std::clamp(1 + y, least_factor, most_); }
   Moments residual(std::size_t site) const;
   double merit(std::size_t site) const;
-  void solve_at_once(const std::vector<std::uint8_t>& free, const std::vector<Moments>& scale, const std::vector<Moments>& rest, std::vector<Moments>& step);
-  void descend(const std::vector<Moments>& curvature, const std::vector<std::uint8_t>& found);
+  void solve_at_once(const std::vector<std::uint8_t>& free, const std::vector<double>& scale, const std::vector<Moments>& rest, std::vector<Moments>& step);
+  void descend(const std::vector<double>& curvature, const std::vector<std::uint8_t>& found);
 
   double most_;
   std::vector<Moments> phi_;
