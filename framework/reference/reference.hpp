@@ -126,9 +126,13 @@ struct Elasticity {
 double pair_energy(const Cloud&, const std::string& name, const Elasticity&, const Vector& u);
 Vector pair_force(const Cloud&, const std::string& name, const Elasticity&, const Vector& u);
 
+/// What the polynomial of degree 1 ... order that fits u_j - u_i best, by weights b omega V, has at each bond of i: row k of the matrix times the
+/// differences of the family. The highest order not above this one that the family supports; empty when none.
+Matrix polynomial_fit(const Cloud&, int i, int order, double singular);
+
 /// Zero-energy penalties "silling" (with its coefficient G) and "wan" of a point gradient of the given order. Quadratic in u:
-/// this is d2E/du2, E = u.Su/2, force = -Su.
+/// this is d2E/du2, E = u.Su/2, force = -Su. whole: of what the whole fit leaves of a bond, else of what its linear part does.
 Matrix stabilization(const Cloud&, const std::string& name, const Elasticity&, double coefficient = 1, int order = 1,
-                     double singular = 1e-10);
+                     double singular = 1e-10, bool whole = true);
 
 }  // namespace perikit::reference

@@ -223,6 +223,23 @@ Stencil point_gradient(const Cloud& cloud, int i, int order, double singular) {
   return g;
 }
 
+Matrix polynomial_fit(const Cloud& cloud, int i, int order, double singular) {
+  const std::vector<int> family = cloud.family(i);
+  for (int n = order; n >= 1 && !family.empty(); --n) {
+    Matrix Q(static_cast<Eigen::Index>(family.size()), monomials(cloud.bond(i, family.front()), n).size());
+    Vector weight(Q.rows());
+    for (Eigen::Index k = 0; k < Q.rows(); ++k) {
+      const int j = family[static_cast<std::size_t>(k)];
+      Q.row(k) = monomials(cloud.bond(i, j) / cloud.horizon, n).transpose();
+      weight[k] = cloud.intact(i, j) * cloud.omega(i, j) * cloud.volume[j];
+    }
+    const Matrix moment = Q.transpose() * weight.asDiagonal() * Q;
+    const Vector values = Eigen::SelfAdjointEigenSolver<Matrix>(moment).eigenvalues();
+    if (values[values.size() - 1] > 0 && values[0] >= singular * values[values.size() - 1]) return Q * moment.inverse() * Q.transpose() * weight.asDiagonal();
+  }
+  return {};
+}
+
 Operator build(const Cloud& cloud, const Description& description, const std::vector<int>& owners) {
   Operator result{cloud.dimension, cloud.points(), {}, {}, {}, {}};
   std::vector<int> chosen = owners;

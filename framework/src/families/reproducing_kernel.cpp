@@ -96,4 +96,18 @@ void kernel_residuals(const FamilyArrays& family, double horizon, int order, std
   values -= monomials.q.transpose() * coefficients;
 }
 
+std::size_t orthonormal_polynomials(const FamilyArrays& family, double horizon, int order, std::vector<double>& phi) {
+  phi.clear();
+  if (order < 1) return 0;
+  const Monomials monomials(family, horizon, order);
+  const Eigen::VectorXd root = monomials.weight.cwiseSqrt();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(root.asDiagonal() * monomials.q.transpose());
+  const Eigen::Index count = monomials.q.rows();
+  const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(family.bonds, count);
+  phi.reserve(static_cast<std::size_t>(family.bonds * count));
+  for (Eigen::Index k = 0; k < family.bonds; ++k)
+    for (Eigen::Index a = 0; a < count; ++a) phi.push_back(root(k) > 0 ? basis(k, a) / root(k) : 0.0);
+  return static_cast<std::size_t>(count);
+}
+
 }  // namespace perikit

@@ -14,4 +14,9 @@ int reproducing_kernel(const FamilyArrays& family, double horizon, int order, st
 /// them. order: one that reproducing_kernel has returned for the family.
 void kernel_residuals(const FamilyArrays& family, double horizon, int order, std::span<const double> u, std::vector<double>& z);
 
+/// Orthonormal polynomials of degree 1 ... order over the bonds of a family, sum_k omega V_k phi_a phi_b = 1 where a = b, else 0:
+/// phi[k * m + a], 0 where a bond has no weight. The polynomial that fits values u of the bonds best is sum_a phi_a sum_k omega V_k phi_a(k) u_k.
+/// order: one that reproducing_kernel has returned for the family. Returns m, their number.
+std::size_t orthonormal_polynomials(const FamilyArrays& family, double horizon, int order, std::vector<double>& phi);
+
 }  // namespace perikit

@@ -134,7 +134,7 @@ const char* BondRelease::unknown(const TermParts& parts) {
   if (f.pairs) return "of pair laws";
   if (f.selective() && f.weighted && f.parts(dimension) > 0) return "of selective gradients of parts of families";
   if (f.selective() && f.order > 1) return "of selective gradients of orders above 1";
-  if (stabilized && f.order > 1) return "of penalties over gradients of orders above 1";
+  if (stabilized && f.order > 1 && parts.stabilization->traits().fit == PenaltyFit::linear) return "of penalties on what the linear part of a fit of order 2 or more leaves";
   if (f.force_state == ForceState::local) return "of local force states";
   return nullptr;
 }
@@ -488,7 +488,8 @@ void BondRelease::release_weighted(Owner& owner, const BondSamples& samples, Mem
   }
 }
 
-/// E = 1/2 V_i sum_k V_k omega z_k . M z_k, and M follows from K^-1. Through H nothing happens: sum of omega V z (x) xi is zero.
+/// E = 1/2 V_i sum_k V_k omega z_k . M z_k, and M follows from K^-1. Through H, or the whole fit, nothing happens: sum of omega V z q(xi) is zero for
+/// all of its monomials.
 template <int D>
 void BondRelease::release_penalty(Owner& owner, Memory& m) const {
   const auto p = static_cast<std::size_t>(owner.point);
