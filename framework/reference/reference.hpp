@@ -45,6 +45,7 @@ enum class Weight { volume, kernel };
 struct Description {
   std::string name = "conventional";
   int order = 1;                                      ///< conventional, baqp, projection: of the point gradient
+  double cell = 0;                                    ///< conventional: width of the cells whose second moments count; 0: none
   int parts = 0;                                      ///< sub_horizon: 0: 2^d; 1: the whole horizon; 4 in 1D: C's four-part split
   bool part_volumes = false;                          ///< sub_horizon: weights V_i V_alpha / V_H (over intact bonds) instead of V_i / parts
   double bond_horizon_ratio = 1;                      ///< bond_associated: radius of the ball around X_j over delta

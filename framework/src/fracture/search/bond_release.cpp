@@ -305,6 +305,8 @@ void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) c
   } else if (parts_.formulation.bond) {
     release_bonds<D>(owner, samples, m, S);
     release_shares<D>(owner, samples, m, S);
+  } else if (parts_.formulation.own_stencils()) {
+    release_cell<D>(owner, samples, m);
   } else if (const BondSamples::Entry* const entry = samples.find(owner.point, -1)) {
     std::copy_n(entry->tensor, D * D, S);
     release_weight(owner, entry->energy, m);
@@ -350,6 +352,25 @@ void BondRelease::release_parts(Owner& owner, const BondSamples& samples, Memory
       subtract<D>(H, &m.xi[D * k], z);
       owner.released[k] += work<D>(entry->tensor, z, &g[D * k]) / m.family.b(k);
     }
+  }
+  release_weight(owner, stored, m);
+}
+
+/// Their gradients are linear in the coefficients of the fit, which a bond moves by what the whole fit leaves of it.
+template <int D>
+void BondRelease::release_cell(Owner& owner, const BondSamples& samples, Memory& m) const {
+  const std::size_t n = owner.far.size();
+  if (n == 0) return;
+  LocalStencil<D>& stencil = m.stencil<D>();
+  stencil.build({&parts_.formulation, parts_.families->body().horizon()}, m.family, nullptr, 0, nullptr);
+  stencil.expand(m.weighted);
+  double stored = 0;
+  for (int q = 0; q < stencil.points(); ++q) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, BondSamples::part(q));
+    if (!entry) continue;
+    stored += entry->energy;
+    const double* const g = m.weighted.data() + static_cast<std::size_t>(q) * n * D;
+    for (const std::size_t k : m.wanted) owner.released[k] += work<D>(entry->tensor, &m.z[D * k], g + D * k) / m.family.b(k);
   }
   release_weight(owner, stored, m);
 }
