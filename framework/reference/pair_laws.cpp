@@ -115,7 +115,7 @@ Vector pair_force(const Cloud& cloud, const std::string& name, const Elasticity&
 }
 
 Matrix stabilization(const Cloud& cloud, const std::string& name, const Elasticity& elasticity, double coefficient, int order,
-                     double singular) {
+                     double singular, bool whole) {
   if (name != "silling" && name != "wan") throw std::invalid_argument("no stabilization '" + name + "'");
   const int d = cloud.dimension, n = cloud.points();
   Matrix S = Matrix::Zero(d * n, d * n);
@@ -137,12 +137,23 @@ Matrix stabilization(const Cloud& cloud, const std::string& name, const Elastici
       const Matrix inverse = K.inverse();
       M = elasticity.lambda * inverse.trace() * Matrix::Identity(d, d) + 2 * elasticity.mu * inverse;
     }
-    for (const int j : cloud.family(i)) {
-      // z_ij = u_j - u_i - Hbar_i xi_ij = sum_k z_k u_k
+    const std::vector<int> family = cloud.family(i);
+    const Matrix fit = whole ? polynomial_fit(cloud, i, order, singular) : Matrix();
+    for (std::size_t m = 0; m < family.size(); ++m) {
+      // z_ij = u_j - u_i - Hbar_i xi_ij = sum_k z_k u_k, or the whole fit instead of Hbar_i xi_ij
+      const int j = family[m];
       Vector z = Vector::Zero(n);
       z[j] += 1;
       z[i] -= 1;
-      for (const auto& [k, g] : own) z[k] -= g.dot(cloud.bond(i, j));
+      if (whole) {
+        for (std::size_t k = 0; k < family.size(); ++k) {
+          const double share = fit(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(k));
+          z[family[k]] -= share;
+          z[i] += share;
+        }
+      } else {
+        for (const auto& [k, g] : own) z[k] -= g.dot(cloud.bond(i, j));
+      }
       const double factor = cloud.volume[i] * cloud.volume[j] * cloud.intact(i, j) * cloud.omega(i, j);
       std::vector<int> touched;
       for (int k = 0; k < n; ++k)

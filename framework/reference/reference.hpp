@@ -45,6 +45,7 @@ enum class Weight { volume, kernel };
 struct Description {
   std::string name = "conventional";
   int order = 1;                                      ///< conventional, baqp, projection: of the point gradient
+  double cell = 0;                                    ///< conventional: width of the cells whose second moments count; 0: none
   int parts = 0;                                      ///< sub_horizon: 0: 2^d; 1: the whole horizon; 4 in 1D: C's four-part split
   bool part_volumes = false;                          ///< sub_horizon: weights V_i V_alpha / V_H (over intact bonds) instead of V_i / parts
   double bond_horizon_ratio = 1;                      ///< bond_associated: radius of the ball around X_j over delta
@@ -126,9 +127,13 @@ struct Elasticity {
 double pair_energy(const Cloud&, const std::string& name, const Elasticity&, const Vector& u);
 Vector pair_force(const Cloud&, const std::string& name, const Elasticity&, const Vector& u);
 
+/// What the polynomial of degree 1 ... order that fits u_j - u_i best, by weights b omega V, has at each bond of i: row k of the matrix times the
+/// differences of the family. The highest order not above this one that the family supports; empty when none.
+Matrix polynomial_fit(const Cloud&, int i, int order, double singular);
+
 /// Zero-energy penalties "silling" (with its coefficient G) and "wan" of a point gradient of the given order. Quadratic in u:
-/// this is d2E/du2, E = u.Su/2, force = -Su.
+/// this is d2E/du2, E = u.Su/2, force = -Su. whole: of what the whole fit leaves of a bond, else of what its linear part does.
 Matrix stabilization(const Cloud&, const std::string& name, const Elasticity&, double coefficient = 1, int order = 1,
-                     double singular = 1e-10);
+                     double singular = 1e-10, bool whole = true);
 
 }  // namespace perikit::reference

@@ -69,6 +69,28 @@ Stencil kernel_gradient(const Cloud& cloud, int i, int order, double singular, c
   return finished(g);
 }
 
+/// Derivatives of the monomials by the axes, a row each.
+Matrix monomial_derivatives(const Vector& x, int order) {
+  // Of products of powers, factor by factor.
+  const auto d = x.size();
+  std::vector<Vector> rows;
+  for (int degree = 1; degree <= order; ++degree)
+    for (int a = degree; a >= 0; --a)
+      for (int b = degree - a; b >= 0; --b) {
+        const int power[3] = {a, b, degree - a - b};
+        if ((d < 2 && b > 0) || (d < 3 && power[2] > 0)) continue;
+        Vector row(d);
+        for (Eigen::Index e = 0; e < d; ++e) {
+          row[e] = power[e];
+          for (Eigen::Index c = 0; c < d; ++c) row[e] *= c == e ? (power[c] > 0 ? std::pow(x[c], power[c] - 1) : 0.0) : std::pow(x[c], power[c]);
+        }
+        rows.push_back(row);
+      }
+  Matrix result(static_cast<Eigen::Index>(rows.size()), d);
+  for (std::size_t r = 0; r < rows.size(); ++r) result.row(static_cast<Eigen::Index>(r)) = rows[r].transpose();
+  return result;
+}
+
 /// Share of a bond in sub-horizon `part`: 1 inside, halved for every dividing plane that it lies on, 0 outside.
 double share(const Vector& xi, double horizon, int parts, int part) {
   const double on_plane = 1e-9 * horizon;
@@ -97,7 +119,9 @@ class Builder {
       sum_V_ += cloud_.volume[k];
       surviving_ += cloud_.intact(i, k) * cloud_.omega(i, k) * cloud_.volume[k];
     }
-    if (description_.name == "conventional") {
+    if (description_.name == "conventional" && description_.cell > 0) {
+      append_cell(i, out);
+    } else if (description_.name == "conventional") {
       out.push_back({i, -1, point_weight(i), own_gradient(i)});
     } else if (description_.name == "sub_horizon") {
       append_parts(i, out);
@@ -124,6 +148,40 @@ class Builder {
     const auto [entry, fresh] = gradients_.try_emplace(i);
     if (fresh) entry->second = point_gradient(cloud_, i, description_.order, description_.singular);
     return entry->second;
+  }
+
+  /// The gradient of the fit at X_i +- s e_a, s^2 = d h^2/12, which have the second moments of a cube of width h.
+  void append_cell(int i, std::vector<EvaluationPoint>& out) {
+    const int d = cloud_.dimension;
+    for (int a = 0; a < d; ++a)
+      for (const double side : {1.0, -1.0}) {
+        Vector x = Vector::Zero(d);
+        x[a] = side * description_.cell * std::sqrt(d / 12.0);
+        out.push_back({i, -1, point_weight(i) / (2 * d), fitted_gradient(i, x)});
+      }
+  }
+
+  /// The gradient at X_i + x of the polynomial that fits the bonds best.
+  Stencil fitted_gradient(int i, const Vector& x) const {
+    for (int n = description_.order; n >= 1; --n) {
+      const Eigen::Index size = monomials(x, n).size();
+      Matrix M = Matrix::Zero(size, size);
+      for (const int k : family_) {
+        const Vector Q = monomials(cloud_.bond(i, k) / cloud_.horizon, n);
+        M += cloud_.intact(i, k) * cloud_.omega(i, k) * cloud_.volume[k] * Q * Q.transpose();
+      }
+      const Vector values = Eigen::SelfAdjointEigenSolver<Matrix>(M).eigenvalues();
+      if (!(values[size - 1] > 0) || values[0] < description_.singular * values[size - 1]) continue;
+      const Matrix derivatives = monomial_derivatives(x / cloud_.horizon, n).transpose() / cloud_.horizon * M.inverse();
+      Accumulator g;
+      for (const int k : family_) {
+        const Vector g_k = cloud_.intact(i, k) * cloud_.omega(i, k) * cloud_.volume[k] * derivatives * monomials(cloud_.bond(i, k) / cloud_.horizon, n);
+        add(g, k, g_k);
+        add(g, i, -g_k);
+      }
+      return finished(g);
+    }
+    return {};
   }
 
   void append_parts(int i, std::vector<EvaluationPoint>& out) {
@@ -221,6 +279,23 @@ Stencil point_gradient(const Cloud& cloud, int i, int order, double singular) {
   for (int n = order; n >= 1 && g.empty(); --n)
     g = kernel_gradient(cloud, i, n, singular, family, [&](int k) { return cloud.intact(i, k) * cloud.omega(i, k); });
   return g;
+}
+
+Matrix polynomial_fit(const Cloud& cloud, int i, int order, double singular) {
+  const std::vector<int> family = cloud.family(i);
+  for (int n = order; n >= 1 && !family.empty(); --n) {
+    Matrix Q(static_cast<Eigen::Index>(family.size()), monomials(cloud.bond(i, family.front()), n).size());
+    Vector weight(Q.rows());
+    for (Eigen::Index k = 0; k < Q.rows(); ++k) {
+      const int j = family[static_cast<std::size_t>(k)];
+      Q.row(k) = monomials(cloud.bond(i, j) / cloud.horizon, n).transpose();
+      weight[k] = cloud.intact(i, j) * cloud.omega(i, j) * cloud.volume[j];
+    }
+    const Matrix moment = Q.transpose() * weight.asDiagonal() * Q;
+    const Vector values = Eigen::SelfAdjointEigenSolver<Matrix>(moment).eigenvalues();
+    if (values[values.size() - 1] > 0 && values[0] >= singular * values[values.size() - 1]) return Q * moment.inverse() * Q.transpose() * weight.asDiagonal();
+  }
+  return {};
 }
 
 Operator build(const Cloud& cloud, const Description& description, const std::vector<int>& owners) {

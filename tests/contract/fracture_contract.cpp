@@ -137,8 +137,9 @@ std::optional<Response> dense_response(Simulation& simulation, double height) {
     const auto below = [&](int k) { return position[static_cast<std::size_t>(k)][1] < height; };
     return below(i) == below(j) ? 1.0 : 0.0;
   };
-  const auto description = description_of(*simulation.scene().kinematics);
+  auto description = description_of(*simulation.scene().kinematics);
   if (!description) return std::nullopt;
+  set_cell(*simulation.scene().kinematics, body, *description);
   const reference::Operator op = reference::build(cloud, *description);
   const reference::Vector u = dense(body, problem.state().displacement()), f = reference::force(op, saint_venant_kirchhoff(), u);
   Response r{reference::energy(op, saint_venant_kirchhoff(), u), problem.make_field()};

@@ -42,7 +42,7 @@ TEST_CASE("kinematics: agrees with the dense reference") {
   constexpr double tolerance = 1e-11;   // of the largest force; and of the energy
   for (const Example& example : examples(Kind::kinematics)) {
     const auto part = parse_part(Kind::kinematics, example.part, example.table, subject().registry);
-    const auto description = description_of(*part);
+    auto description = description_of(*part);
     if (!description) {
       MESSAGE("no dense reference of kinematics '" << example.part << "'");
       continue;
@@ -55,6 +55,8 @@ TEST_CASE("kinematics: agrees with the dense reference") {
       const auto simulation = build(scene_text(options, kinematics_table(example)));
       BodyProblem& problem = simulation->problem();
       const Body& body = problem.body();
+      description->cell = 0;
+      set_cell(*part, body, *description);
       deform(body, problem.state().displacement(), 61, 0.02);
       const auto d = static_cast<Eigen::Index>(body.dimension()), n = static_cast<Eigen::Index>(body.points());
       const reference::Vector u = dense(body, problem.state().displacement());

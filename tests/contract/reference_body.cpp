@@ -72,6 +72,11 @@ std::optional<reference::Description> description_of(const PartValues& part) {
   return description;
 }
 
+void set_cell(const PartValues& part, const Body& body, reference::Description& description) {
+  const bool wanted = !part.values.has("cell_moments") || part.values.boolean("cell_moments");
+  if (part.type == "conventional" && description.order > 1 && body.lattice() && wanted) description.cell = body.lattice()->spacing;
+}
+
 reference::Law saint_venant_kirchhoff() {
   using reference::Tensor;
   const double mu = youngs_modulus / (2 * (1 + poisson_ratio)), lambda = 2 * mu * poisson_ratio / (1 - 2 * poisson_ratio);

@@ -17,6 +17,8 @@ reference::Elasticity elasticity(const Body& body);
 reference::Vector dense(const Body& body, ConstFieldView field);
 /// The reference's description of a kinematics; nothing where the reference does not know the part.
 std::optional<reference::Description> description_of(const PartValues& part);
+/// Of `conventional` on this body: the cells whose second moments count.
+void set_cell(const PartValues& part, const Body& body, reference::Description& description);
 /// The fixture's material: S = lambda tr(E) I + 2 mu E.
 reference::Law saint_venant_kirchhoff();
 

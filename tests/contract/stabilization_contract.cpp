@@ -33,11 +33,13 @@ TEST_CASE("stabilization: what it adds agrees with the dense reference") {
   for (const Example& example : examples(Kind::stabilization)) {
     if (example.part != "silling" && example.part != "wan") continue;
     const auto part = parse_part(Kind::stabilization, example.part, example.table, subject().registry);
+    const bool whole = part->values.text("fit") == "whole";
     const double coefficient = part->values.has("coefficient") ? part->values.number("coefficient") : 1.0;
     for (int d = 1; d <= 3; ++d)
       for (const bool cloud : {false, true})
         for (const bool crack : {false, true})
           for (const auto& space : {std::pair{"strain", 1}, std::pair{"strain", 2}, std::pair{"stress", 1}}) {
+            if (!whole && space.second == 1) continue;   // the same
             const std::string plane = space.first;
             const int order = space.second;
             if ((crack && (d == 1 || plane == "stress")) || (plane == "stress" && d == 3)) continue;
@@ -58,7 +60,7 @@ TEST_CASE("stabilization: what it adds agrees with the dense reference") {
             for (Simulation* simulation : {plain.get(), with.get()}) deform(body, simulation->problem().state().displacement(), 71, 0.02);
             const Result base = evaluate(plain->problem(), w), sum = evaluate(with->problem(), w);
             const auto influence = subject().registry.influence(*with->scene().influence);
-            const reference::Matrix S = reference::stabilization(cloud_of(body, *influence), example.part, elasticity(body), coefficient, order, 1e-8);
+            const reference::Matrix S = reference::stabilization(cloud_of(body, *influence), example.part, elasticity(body), coefficient, order, 1e-8, whole);
             const reference::Vector u = dense(body, with->problem().state().displacement());
             const reference::Vector force = dense(body, sum.force) - dense(body, base.force), stiffness = dense(body, sum.stiffness) - dense(body, base.stiffness);
             CHECK((force + S * u).cwiseAbs().maxCoeff() <= tolerance * dense(body, sum.force).cwiseAbs().maxCoeff());

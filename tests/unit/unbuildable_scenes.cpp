@@ -104,6 +104,7 @@ const Fault faults[]{
     {"kinematics", "type", "\"sub_horizon\"\nparts = 2", "", 16, "kinematics.parts", "found 2 in a body of dimension 2", "4"},
     {"kinematics", "type", "\"conventional\"\norder = 4", "", 16, "kinematics.order", "found 4, for which a family needs 14 bonds and more; the largest one here has 11",
      "1 to 3, or a wider horizon"},
+    {"kinematics", "type", "\"conventional\"\ncell_moments = true", "", 16, "kinematics.cell_moments", "found true with order = 1", "order = 2 or more, or false"},
     {"kinematics", "type", "\"selective\"\nbase = { type = \"baqp\", order = 8 }", "", 16, "kinematics.base.order", "found 8, for which a family needs 44 bonds",
      "1 to 3, or a wider horizon"},
     {"family", "influence", "{ type = \"expression\", formula = \"r -\" }", "", 0, "family.influence.formula", "found \"r -\"",

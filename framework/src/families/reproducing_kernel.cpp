@@ -49,26 +49,31 @@ struct Monomials {
   }
 };
 
+/// By bond and axis: sum_a of_monomial(a, e) (M^-1 q(xi_k))_a omega V_k, M^-1 q W = R^-1 Q^T W^(1/2) with W^(1/2) q^T = Q R, whose condition is the root of
+/// M's. With its eigenvalues 3e7 apart (order 8 in 3D) the gradient is exact to 1e-12 (tests/unit/gradient_order.cpp), where the inverse of M would
+/// lose seven digits. of_monomial is overwritten.
+Eigen::MatrixXd weigh_monomials(const Monomials& monomials, Eigen::MatrixXd& of_monomial) {
+  const Eigen::Index size = monomials.q.rows(), bonds = monomials.q.cols();
+  const Eigen::VectorXd root = monomials.weight.cwiseSqrt();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(root.asDiagonal() * monomials.q.transpose());
+  qr.matrixQR().topRows(size).triangularView<Eigen::Upper>().transpose().solveInPlace(of_monomial);   // R^-T
+  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(bonds, of_monomial.cols());
+  spread.topRows(size) = of_monomial;
+  return (qr.householderQ() * spread).transpose() * root.asDiagonal();
+}
+
 bool exactly(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
   const auto d = static_cast<std::size_t>(family.dimension), bonds = static_cast<std::size_t>(family.bonds);
   const Monomials monomials(family, horizon, order);
   const Eigen::MatrixXd& q = monomials.q;
-  const Eigen::VectorXd& weight = monomials.weight;
   const Eigen::Index size = q.rows();
-  const Eigen::MatrixXd M = q * weight.asDiagonal() * q.transpose();
+  const Eigen::MatrixXd M = q * monomials.weight.asDiagonal() * q.transpose();
   const SymmetricEigen eigen(static_cast<int>(size), M.data(), false);
   if (!(eigen.largest() > 0) || !(eigen.least() >= singular_ratio * eigen.largest())) return false;
-  // M^-1 q W = R^-1 Q^T W^(1/2) with W^(1/2) q^T = Q R, whose condition is the root of M's. With its eigenvalues
-  // 3e7 apart (order 8 in 3D) the gradient is exact to 1e-12 (tests/unit/gradient_order.cpp), where the inverse of M would lose seven digits.
-  const Eigen::VectorXd root = weight.cwiseSqrt();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(root.asDiagonal() * q.transpose());
   const auto rows = static_cast<Eigen::Index>(d);
-  Eigen::MatrixXd top = Eigen::MatrixXd::Zero(size, rows);   // R^-T e, of the linear monomials
-  top.topRows(rows).setIdentity();
-  qr.matrixQR().topRows(size).triangularView<Eigen::Upper>().transpose().solveInPlace(top);
-  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(bonds), rows);
-  spread.topRows(size) = top;
-  const Eigen::MatrixXd stencil = (qr.householderQ() * spread).transpose() * root.asDiagonal() / horizon;
+  Eigen::MatrixXd linear = Eigen::MatrixXd::Zero(size, rows);
+  linear.topRows(rows).setIdentity();
+  const Eigen::MatrixXd stencil = weigh_monomials(monomials, linear) / horizon;
   for (std::size_t k = 0; k < bonds; ++k)
     for (std::size_t e = 0; e < d; ++e) g[k * d + e] = stencil(static_cast<Eigen::Index>(e), static_cast<Eigen::Index>(k));
   return true;
@@ -84,6 +89,26 @@ int reproducing_kernel(const FamilyArrays& family, double horizon, int order, st
   return 0;
 }
 
+void kernel_gradients_at(const FamilyArrays& family, double horizon, int order, std::span<const std::array<double, 3>> places, std::vector<double>& g) {
+  const auto d = static_cast<std::size_t>(family.dimension), bonds = static_cast<std::size_t>(family.bonds);
+  g.assign(places.size() * bonds * d, 0.0);
+  if (order < 1) return;
+  const Monomials monomials(family, horizon, order);
+  const auto terms = exponents(family.dimension, order);
+  Eigen::MatrixXd derivatives(monomials.q.rows(), static_cast<Eigen::Index>(places.size() * d));   // of the monomials at the places
+  for (std::size_t q = 0; q < places.size(); ++q)
+    for (std::size_t e = 0; e < d; ++e)
+      for (std::size_t t = 0; t < terms.size(); ++t) {
+        double value = terms[t][e];
+        for (std::size_t c = 0; c < d && value != 0; ++c) value *= power(places[q][c] / horizon, terms[t][c] - (c == e ? 1 : 0));
+        derivatives(static_cast<Eigen::Index>(t), static_cast<Eigen::Index>(q * d + e)) = value;
+      }
+  const Eigen::MatrixXd stencil = weigh_monomials(monomials, derivatives) / horizon;
+  for (std::size_t q = 0; q < places.size(); ++q)
+    for (std::size_t k = 0; k < bonds; ++k)
+      for (std::size_t e = 0; e < d; ++e) g[(q * bonds + k) * d + e] = stencil(static_cast<Eigen::Index>(q * d + e), static_cast<Eigen::Index>(k));
+}
+
 void kernel_residuals(const FamilyArrays& family, double horizon, int order, std::span<const double> u, std::vector<double>& z) {
   z.assign(u.begin(), u.end());
   if (order < 1) return;
@@ -94,6 +119,20 @@ void kernel_residuals(const FamilyArrays& family, double horizon, int order, std
   const Eigen::MatrixXd weighted = root.asDiagonal() * monomials.q.transpose();
   const Eigen::MatrixXd coefficients = weighted.householderQr().solve(root.asDiagonal() * values);
   values -= monomials.q.transpose() * coefficients;
+}
+
+std::size_t orthonormal_polynomials(const FamilyArrays& family, double horizon, int order, std::vector<double>& phi) {
+  phi.clear();
+  if (order < 1) return 0;
+  const Monomials monomials(family, horizon, order);
+  const Eigen::VectorXd root = monomials.weight.cwiseSqrt();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(root.asDiagonal() * monomials.q.transpose());
+  const Eigen::Index count = monomials.q.rows();
+  const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(family.bonds, count);
+  phi.reserve(static_cast<std::size_t>(family.bonds * count));
+  for (Eigen::Index k = 0; k < family.bonds; ++k)
+    for (Eigen::Index a = 0; a < count; ++a) phi.push_back(root(k) > 0 ? basis(k, a) / root(k) : 0.0);
+  return static_cast<std::size_t>(count);
 }
 
 }  // namespace perikit

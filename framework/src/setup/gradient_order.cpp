@@ -39,4 +39,17 @@ void refuse_order(const Scene& scene, const Formulation& formulation, const Fami
                                formulation.order, monomials(body.dimension(), formulation.order), bonds, highest, highest));
 }
 
+void set_cell_moments(const Scene& scene, const Body& body, Formulation& formulation) {
+  const std::optional<bool> wanted = formulation.point ? formulation.point->cell_moments() : false;
+  const bool possible = formulation.order > 1 && body.lattice();
+  if (wanted.value_or(false) && !possible) {
+    const ParameterValues& values = scene.kinematics->values;
+    throw InputError(values.position("cell_moments"), values.path() + ".cell_moments",
+                     formulation.order < 2 ? "found true with order = 1, whose gradient is the same everywhere in the cell of a point; allowed: order = 2 or more, or false"
+                                           : "found true on points that are no lattice, the moments of whose cells are not known; allowed: [body.lattice] without jitter and "
+                                             "partial_volume, or false");
+  }
+  if (wanted.value_or(possible)) formulation.cell = body.lattice()->spacing;
+}
+
 }  // namespace perikit

@@ -12,4 +12,8 @@ namespace perikit {
 /// All ranks must call it.
 void refuse_order(const Scene& scene, const Formulation& formulation, const Families& families);
 
+/// Whether the second moments of cells count, as the kinematics wants it or, where it leaves that open, on lattices over orders above 1. Throws an InputError
+/// where they are asked for and there are none.
+void set_cell_moments(const Scene& scene, const Body& body, Formulation& formulation);
+
 }  // namespace perikit

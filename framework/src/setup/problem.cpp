@@ -252,6 +252,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   const Body& body = *parts.body;
   const Partition* const partition = parts.partition.get();
   refuse_stress(scene, body, of_terms.formulation);
+  set_cell_moments(scene, body, of_terms.formulation);
   steps.begin("laws");
   parts.laws = build_laws(scene, factory, body, parts.images != nullptr);
   refuse_history(scene, *parts.laws, of_terms.formulation);

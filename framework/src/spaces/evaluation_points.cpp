@@ -26,7 +26,7 @@ double EvaluationPoints<D>::weight(int q) {
   const Families& families = parts_.families;
   const double volume = families.body().volume(p_), intact = volume * (1 - families.damage(p_));
   if (!at_bonds()) {
-    if (!parts_.formulation.weighted) return intact;
+    if (!parts_.formulation.own_stencils()) return intact;
     make_weighted();
     return stencil_.share(stencil_.points() - parts_of_family_ + q) * intact;
   }
@@ -49,7 +49,7 @@ const double* EvaluationPoints<D>::own() {
 
 template <int D>
 const double* EvaluationPoints<D>::gradient(int q) {
-  if (!parts_.formulation.weighted) return own();
+  if (!parts_.formulation.own_stencils()) return own();
   make_weighted();
   return weighted_.data() + static_cast<std::size_t>(stencil_.points() - points() + q) * bonds() * D;
 }

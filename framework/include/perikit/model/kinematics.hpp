@@ -4,7 +4,7 @@
 /// momentum balances hold for every formulation without further code. A library implements one of four small classes:
 ///
 // clang-format off
-///   PointKinematics     one evaluation point per point: H_i = Hbar_i, the point gradient of order n (conventional)
+///   PointKinematics     one evaluation point per point, H_i = Hbar_i, the point gradient of order n, or a few in its cell (conventional)
 ///   BondKinematics      one per bond: H_b = A_b + (u_b - A_b xi) (x) g_b, A_b = (1 - s) Hbar_i + s Hbar_j, s = 0, 1/2
 ///                       (projection, baqp) or any other share
 ///   WeightedKinematics  one or more per point: H_q = (sum_k omega_q(k) V_k u_k (x) xi_k) K_q^-1 (non_spherical, sub_horizon, ...)
@@ -22,6 +22,7 @@
 /// The engine makes extensions, dilatations, forces and tangents of it; both moduli come from the small strain of the material.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -140,6 +141,9 @@ class PointKinematics : public Kinematics {
  public:
   /// Of the point gradient, from 1.
   virtual int order() const noexcept = 0;
+  /// Whether the energy of a point counts with the second moments of its cell, over orders above 1: evaluation points at X_i +- s e_a instead of
+  /// one at X_i, with the gradient there of the fit of order n. Nothing: on lattices, whose cells are known.
+  virtual std::optional<bool> cell_moments() const noexcept { return false; }
 };
 
 class BondKinematics : public Kinematics {

@@ -5,8 +5,10 @@
 ///   E = 1/2 sum_i V_i sum_j V_j omega_ij z_ij . M_i z_ij           (z is linear in u: E is quadratic, its tangent constant)
 ///   T_ij = omega_ij M_i z_ij,   force density sum_j (T_ij - T_ji) V_j
 ///
-/// The simple force state is the exact derivative for gradients of order 1: Hbar_i is the minimiser of sum_j omega |z|^2 V_j, hence
-/// sum_j omega z (x) xi V_j = 0. At higher orders the engine adds the derivative through Hbar_i.
+/// Over gradients of order n > 1 the fit of order n, from which Hbar_i is taken, may be subtracted whole instead of Hbar_i xi_ij alone (PenaltyFit):
+/// then E vanishes for all polynomials up to degree n, bending among them.
+/// The simple force state is the exact derivative where the fit is whole, at order 1 always: it is the minimiser of sum_j omega |z|^2 V_j, hence
+/// sum_j omega z q(xi) V_j = 0 for each of its monomials q. Of the linear part of a fit of higher order the engine adds the derivative through Hbar_i.
 /// E vanishes for affine motions. Under a superposed rotation z turns: E is objective, and its forces keep angular momentum, where
 /// M_i is a multiple of I.
 
@@ -21,8 +23,12 @@ struct PenaltyPoint : FamilyPoint {
   const double* inverse_shape = nullptr;
 };
 
+/// What is subtracted from a bond, over gradients of order n: their linear part Hbar_i xi, or the whole fit. The same at order 1.
+enum class PenaltyFit { linear, whole };
+
 struct StabilizationTraits {
   bool isotropic = false;                   ///< M_i = m_i I: `penalty` writes one number
+  PenaltyFit fit = PenaltyFit::whole;
 };
 
 class Stabilization {

@@ -134,7 +134,7 @@ const char* BondRelease::unknown(const TermParts& parts) {
   if (f.pairs) return "of pair laws";
   if (f.selective() && f.weighted && f.parts(dimension) > 0) return "of selective gradients of parts of families";
   if (f.selective() && f.order > 1) return "of selective gradients of orders above 1";
-  if (stabilized && f.order > 1) return "of penalties over gradients of orders above 1";
+  if (stabilized && f.order > 1 && parts.stabilization->traits().fit == PenaltyFit::linear) return "of penalties on what the linear part of a fit of order 2 or more leaves";
   if (f.force_state == ForceState::local) return "of local force states";
   return nullptr;
 }
@@ -305,6 +305,8 @@ void BondRelease::release(Owner& owner, const BondSamples& samples, Memory& m) c
   } else if (parts_.formulation.bond) {
     release_bonds<D>(owner, samples, m, S);
     release_shares<D>(owner, samples, m, S);
+  } else if (parts_.formulation.own_stencils()) {
+    release_cell<D>(owner, samples, m);
   } else if (const BondSamples::Entry* const entry = samples.find(owner.point, -1)) {
     std::copy_n(entry->tensor, D * D, S);
     release_weight(owner, entry->energy, m);
@@ -350,6 +352,25 @@ void BondRelease::release_parts(Owner& owner, const BondSamples& samples, Memory
       subtract<D>(H, &m.xi[D * k], z);
       owner.released[k] += work<D>(entry->tensor, z, &g[D * k]) / m.family.b(k);
     }
+  }
+  release_weight(owner, stored, m);
+}
+
+/// Their gradients are linear in the coefficients of the fit, which a bond moves by what the whole fit leaves of it.
+template <int D>
+void BondRelease::release_cell(Owner& owner, const BondSamples& samples, Memory& m) const {
+  const std::size_t n = owner.far.size();
+  if (n == 0) return;
+  LocalStencil<D>& stencil = m.stencil<D>();
+  stencil.build({&parts_.formulation, parts_.families->body().horizon()}, m.family, nullptr, 0, nullptr);
+  stencil.expand(m.weighted);
+  double stored = 0;
+  for (int q = 0; q < stencil.points(); ++q) {
+    const BondSamples::Entry* const entry = samples.find(owner.point, BondSamples::part(q));
+    if (!entry) continue;
+    stored += entry->energy;
+    const double* const g = m.weighted.data() + static_cast<std::size_t>(q) * n * D;
+    for (const std::size_t k : m.wanted) owner.released[k] += work<D>(entry->tensor, &m.z[D * k], g + D * k) / m.family.b(k);
   }
   release_weight(owner, stored, m);
 }
@@ -488,7 +509,8 @@ void BondRelease::release_weighted(Owner& owner, const BondSamples& samples, Mem
   }
 }
 
-/// E = 1/2 V_i sum_k V_k omega z_k . M z_k, and M follows from K^-1. Through H nothing happens: sum of omega V z (x) xi is zero.
+/// E = 1/2 V_i sum_k V_k omega z_k . M z_k, and M follows from K^-1. Through H, or the whole fit, nothing happens: sum of omega V z q(xi) is zero for
+/// all of its monomials.
 template <int D>
 void BondRelease::release_penalty(Owner& owner, Memory& m) const {
   const auto p = static_cast<std::size_t>(owner.point);

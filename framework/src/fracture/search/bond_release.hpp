@@ -89,6 +89,9 @@ class BondRelease {
   /// Of evaluation points at parts of the family.
   template <int D>
   void release_parts(Owner& owner, const BondSamples& samples, Memory& m) const;
+  /// Of evaluation points in the cell of the owner.
+  template <int D>
+  void release_cell(Owner& owner, const BondSamples& samples, Memory& m) const;
   /// What goes with the weight that is left to the owner's points, which hold so much [J].
   void release_weight(Owner& owner, double stored, const Memory& m) const;
   template <int D>

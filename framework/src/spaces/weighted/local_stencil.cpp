@@ -1,7 +1,10 @@
 #include "spaces/weighted/local_stencil.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
+#include "families/reproducing_kernel.hpp"
 #include "families/stencils.hpp"
 #include "perikit/core/simd.hpp"
 
@@ -201,7 +204,8 @@ void LocalStencil<D>::set_lever(const StencilRules& rules, const FamilyArrays& f
   lever_.resize(D * row_);
   if (rules.at_points()) {
     std::vector<double> g;
-    fallbacks_ = point_gradient(family, rules.horizon, rules.formulation->order, g) < rules.formulation->order;
+    order_ = point_gradient(family, rules.horizon, rules.formulation->order, g);
+    fallbacks_ = order_ < rules.formulation->order;
     std::fill(lever_.begin(), lever_.end(), 0.0);
     for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
       for (std::size_t e = 0; e < D; ++e) lever_[e * row_ + k] = g[k * D + e];
@@ -227,9 +231,26 @@ void LocalStencil<D>::build(const StencilRules& rules, const FamilyArrays& famil
                             const double* const (*u)[D], double family_volume) {
   make(rules, family, bond_share, fields, u, family_volume);
   shift_.clear();
-  if (!rules.shift.data) return;
-  set_shift(rules, family);
+  if (rules.at_points() && points_ > 1 && order_ > 1) set_cell(rules, family);
+  else if (rules.shift.data) set_shift(rules, family);
+  else return;
   shift_.gradients(fields, u);
+}
+
+template <int D>
+void LocalStencil<D>::set_cell(const StencilRules& rules, const FamilyArrays& family) {
+  const double s = rules.formulation->cell * std::sqrt(D / 12.0);
+  std::array<std::array<double, 3>, 2 * D> places{};
+  for (std::size_t q = 0; q < places.size(); ++q) places[q][q / 2] = q % 2 == 0 ? s : -s;
+  std::vector<double> g;
+  kernel_gradients_at(family, rules.horizon, order_, places, g);
+  shift_.begin(points_, family);
+  double* d = g.data();
+  for (int q = 0; q < points_; ++q, d += static_cast<std::size_t>(bonds_) * D) {
+    for (std::size_t k = 0; k < static_cast<std::size_t>(bonds_); ++k)
+      for (std::size_t e = 0; e < D; ++e) d[k * D + e] -= lever_[e * row_ + k];
+    shift_.set(q, d);
+  }
 }
 
 template <int D>
@@ -270,11 +291,13 @@ void LocalStencil<D>::make(const StencilRules& rules, const FamilyArrays& family
   const auto row = [&](int q) { return omega_.data() + static_cast<std::size_t>(q) * row_; };
   std::fill(row(points_), omega_.data() + omega_.size(), 0.0);
   if (rules.at_points()) {
-    std::fill_n(row(0), row_, 1.0);
-    multiply(0, 1);
+    std::fill(row(0), row(points_), 1.0);
+    multiply(0, points_);
     std::fill(inverse_.begin(), inverse_.end(), 0.0);
-    for (int e = 0; e < D; ++e) inverse_[static_cast<std::size_t>(symmetric_index(D, e, e)) * lanes_] = 1.0;
-    share_[0] = 1.0;
+    for (std::size_t q = 0; q < static_cast<std::size_t>(points_); ++q) {
+      for (int e = 0; e < D; ++e) inverse_[static_cast<std::size_t>(symmetric_index(D, e, e)) * lanes_ + q] = 1.0;
+      share_[q] = 1.0 / points_;
+    }
     return;
   }
   const auto use_family = [&](int q) {

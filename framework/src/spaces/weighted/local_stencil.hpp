@@ -6,6 +6,9 @@
 /// One number is kept for a pair (q, k), not one vector, and the sums over k for all q are one matrix product: the influence
 /// times the columns (b_k (x) xi_k, u_k (x) b_k). The adjoint is the transposed product with the columns P_q K_q^-1.
 ///
+/// Point gradients of higher order are b_k, with influence and K of 1; the evaluation points in the cell of a point, where its second moments count,
+/// have the gradient of the fit at X_i +- s e_a, s^2 = D h^2/12, with equal shares: sum_q w_q x_q (x) x_q is that of a cube of width h.
+///
 /// Local force states (evaluation points at bonds) test the stress of a bond with that bond alone instead: with w_q the share of the energy,
 ///   t_q = (sum of V over the domain of q / sum of V over the family) / w_q  P_q g_qq                    [Partmann et al. 4.20]
 
@@ -69,6 +72,8 @@ class LocalStencil {
             double family_volume);
   void set_shift(const StencilRules& rules, const FamilyArrays& family);
   void set_lever(const StencilRules& rules, const FamilyArrays& family);
+  /// Evaluation points around a point in its cell, by what their gradients differ from that of the point.
+  void set_cell(const StencilRules& rules, const FamilyArrays& family);
   template <int Fields>
   void fill_columns(const FamilyArrays& family, const double* const (*u)[D]);
   /// The kinematics' influence of every bond in every evaluation point.
@@ -83,6 +88,7 @@ class LocalStencil {
   double least_ratio(const FamilyArrays& family, double beside) const;
 
   int bonds_ = 0, points_ = 0, fallbacks_ = 0, dropped_ = 0;
+  int order_ = 1;                  ///< of the point gradient that the family has
   std::size_t row_ = 0;            ///< padded(bonds)
   std::size_t lanes_ = 0;          ///< padded(points)
   std::size_t width_ = 0;          ///< columns, padded to packs

@@ -20,6 +20,12 @@ void StencilShift<D>::set(int q, const FamilyArrays& family, const double* omega
 }
 
 template <int D>
+void StencilShift<D>::set(int q, const double* d) {
+  for (std::size_t e = 0; e < D; ++e)
+    for (std::size_t k = 0; k < bonds_; ++k) d_[(static_cast<std::size_t>(q) * D + e) * row_ + k] = d[k * D + e];
+}
+
+template <int D>
 void StencilShift<D>::gradients(int fields, const double* const (*u)[D]) {
   H_.assign(static_cast<std::size_t>(fields * points_) * D * D, 0.0);
   double* to = H_.data();

@@ -33,7 +33,7 @@ void each_shift(const FamilyArrays& family, const double* omega, const double* g
   }
 }
 
-/// What a balanced cloud adds to the gradients of a family (spaces/shift.hpp): d_qk of its first evaluation points, H_q += sum_k u_k
+/// What a balanced cloud adds to the gradients of a family (spaces/shift.hpp), and second moments of cells to that of a point: d_qk of its first evaluation points, H_q += sum_k u_k
 /// (x) d_qk, and t_k += sum_q P_q d_qk.
 template <int D>
 class StencilShift {
@@ -45,6 +45,8 @@ class StencilShift {
   void begin(int points, const FamilyArrays& family);
   /// As each_shift has it.
   void set(int q, const FamilyArrays& family, const double* omega, const double* g, ConstFieldView lambda, int first);
+  /// d_qk = d[k * D + e].
+  void set(int q, const double* d);
   /// Takes the fields (local_stencil.hpp).
   void gradients(int fields, const double* const (*u)[D]);
 

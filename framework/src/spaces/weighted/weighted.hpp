@@ -125,7 +125,7 @@ class Weighted final : public EvaluationSpace {
   double weight(std::int32_t p) const noexcept;
   /// The far end that samples of part k have: none, or the part by name where derivatives of each are asked for (BondSamples::part).
   std::int32_t far_of_part(int k, const Pass& pass) const noexcept {
-    return k >= 0 && !rules_.at_points() && pass.bonds && pass.bonds->what() == BondSampling::derivative ? BondSamples::part(k) : -1;
+    return k >= 0 && formulation_.own_stencils() && pass.bonds && pass.bonds->what() == BondSampling::derivative ? BondSamples::part(k) : -1;
   }
   /// Keeps Hbar of one or eight points, evaluation point 0, and gives their volume changes to every lane of the batch. share: c of the
   /// selective map; 1 in groups, which points leave with the first bond that fails.

@@ -13,25 +13,42 @@ namespace {
 ///
 ///   at k with -dE_i/du_k = -(t_k - B g_k),   B = sum_l t_l (x) xi_l,
 ///
-/// and at itself with the opposite of their sum. (B = 0 at order 1.)
+/// and at itself with the opposite of their sum. (B = 0 at order 1.) Where the whole fit is subtracted, sum_k t_k phi_a(k) = 0 for each of its
+/// polynomials, and t_k is all.
 template <int D>
 class StencilPenalty final : public ZeroEnergyPenalty {
-  /// What a point, or all points with whole families on a lattice, has in common: by bond, and M.
+  static constexpr std::size_t most_polynomials = 164;   ///< order 8 in space
+  /// What points with equal families have in common: by bond, and M.
   struct Stencil {
     std::vector<Row> spring;           ///< {xi, w}
-    std::vector<Row> gradient;         ///< g
+    std::vector<Row> gradient;         ///< g; empty where the whole fit is subtracted
+    std::vector<double> polynomial;    ///< then phi_a(k) [k * count + a]
+    std::size_t count = 0;
+    double volume = 0;                 ///< V_i
     Row M[D];                          ///< columns
   };
 
  public:
   explicit StencilPenalty(const PenaltyParts& parts) : ZeroEnergyPenalty(parts), rows_(parts.families), stencil_(rows_.size(), -1) {
     set_blocks();
-    for (std::size_t r = 0; r < rows_.size(); ++r) set_stencil(r);
+    std::vector<std::int32_t> row_of(rows_.body().stride(), -1);
+    for (std::size_t r = 0; r < rows_.size(); ++r) row_of[rows_.point(r)] = static_cast<std::int32_t>(r);
+    parts.families.each_class([&](std::span<const std::int32_t> points) {
+      std::int32_t shared = -1;
+      for (const std::int32_t p : points) {
+        const std::int32_t r = row_of[static_cast<std::size_t>(p)];
+        if (r < 0) continue;
+        if (shared < 0 || !parts_.laws.single()) shared = append(static_cast<std::size_t>(r));
+        stencil_[static_cast<std::size_t>(r)] = shared;
+        if (shared < 0 && parts_.laws.single()) break;   // none of them has a gradient
+      }
+    });
+    shared_ = stencil_;
   }
 
   void bonds_changed(std::span<const std::int32_t> points) override {
     for (const std::int32_t p : points)
-      set_stencil(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
+      renew(static_cast<std::size_t>(std::lower_bound(rows_.points().begin(), rows_.points().end(), p) - rows_.points().begin()));
   }
 
   void apply(ConstFieldView u, double factor, FieldView force, const Region& region, Wanted wanted) override {
@@ -71,29 +88,32 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   }
 
   std::size_t bytes() const noexcept override {
-    std::size_t total = rows_.bytes() + (stencil_.size() + row_order_.size()) * sizeof(std::int32_t) + (u_.size() + force_.size()) * sizeof(Row);
-    for (const Stencil& s : stencils_) total += sizeof(Stencil) + 2 * s.spring.size() * sizeof(Row);
+    std::size_t total = rows_.bytes() + (stencil_.size() + shared_.size() + own_.size() + row_order_.size()) * sizeof(std::int32_t) + (u_.size() + force_.size()) * sizeof(Row);
+    for (const Stencil& s : stencils_) total += sizeof(Stencil) + (s.spring.size() + s.gradient.size()) * sizeof(Row) + s.polynomial.size() * sizeof(double);
     return total;
   }
 
  private:
-  /// Of row r, as its bonds are now. Whole families of one law share theirs.
-  void set_stencil(std::size_t r) {
-    const bool shared = rows_.whole(r) && parts_.laws.single();
-    if (shared && whole_ >= 0) {
-      stencil_[r] = whole_;
-      return;
-    }
-    if (!element_.load(parts_, rows_.point(r))) {
+  /// Adds the stencil of row r, as its bonds are now; -1 where it has no gradient.
+  std::int32_t append(std::size_t r) {
+    if (!element_.load(parts_, rows_.point(r))) return -1;
+    stencils_.push_back(keep(element_));
+    return static_cast<std::int32_t>(stencils_.size()) - 1;
+  }
+
+  /// Of a row whose bonds have changed: families that are as at the set-up have what they had then, others one of their own.
+  void renew(std::size_t r) {
+    stencil_[r] = shared_[r];
+    if (!parts_.families.lost_bonds(rows_.point(r))) return;
+    own_.resize(rows_.size(), -1);
+    if (own_[r] < 0) {
+      stencil_[r] = own_[r] = append(r);
+    } else if (element_.load(parts_, rows_.point(r))) {
+      stencils_[static_cast<std::size_t>(own_[r])] = keep(element_);
+      stencil_[r] = own_[r];
+    } else {
       stencil_[r] = -1;
-      return;
     }
-    if (stencil_[r] < 0 || stencil_[r] == whole_) {
-      stencil_[r] = static_cast<std::int32_t>(stencils_.size());
-      stencils_.emplace_back();
-    }
-    stencils_[static_cast<std::size_t>(stencil_[r])] = keep(element_);
-    if (shared) whole_ = stencil_[r];
   }
 
   static Stencil keep(const PenaltyElement<D>& element) {
@@ -103,8 +123,11 @@ class StencilPenalty final : public ZeroEnergyPenalty {
       for (int e = 0; e < D; ++e) spring[e] = element.family().xi[e][k], gradient[e] = element.gradient(k, e);
       spring[3] = element.spring(k);
       s.spring.push_back(spring);
-      s.gradient.push_back(gradient);
+      if (element.polynomials() == 0) s.gradient.push_back(gradient);
+      for (std::size_t a = 0; a < element.polynomials(); ++a) s.polynomial.push_back(element.polynomial(k, a));
     }
+    s.count = element.polynomials();
+    s.volume = element.owner_volume();
     for (int b = 0; b < D; ++b) {
       s.M[b] = Row{};
       for (int a = 0; a < D; ++a) s.M[b][a] = element.matrix(a, b);
@@ -151,9 +174,41 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     for (std::size_t k = b == 0 ? 0 : block_end_[b - 1]; k < block_end_[b]; ++k) use(static_cast<std::size_t>(row_order_[k]));
   }
 
+  /// t_k of z, and z . t_k.
+  static Row spring(const Stencil& s, std::size_t k, const Row& z, double& work) {
+    Row t{};
+    for (int b = 0; b < D; ++b) t += s.M[b] * (s.spring[k][3] * z[b]);
+    for (int c = 0; c < D; ++c) work += z[c] * t[c];
+    return t;
+  }
+
+  /// t <- t_k by bond, of what the whole fit leaves; sum_k z_ik . t_k.
+  double springs_of_fit(std::size_t r, std::vector<Row>& t) const {
+    const Stencil& s = stencils_[static_cast<std::size_t>(stencil_[r])];
+    const auto family = rows_.neighbours(r);
+    Row fit[most_polynomials];
+    std::fill_n(fit, s.count, Row{});
+    t.resize(family.size());
+    const double* phi = s.polynomial.data();
+    for (std::size_t k = 0; k < family.size(); ++k, phi += s.count) {
+      t[k] = u_[static_cast<std::size_t>(family[k])] - u_[r];
+      const Row weighed = t[k] * (s.spring[k][3] / s.volume);
+      for (std::size_t a = 0; a < s.count; ++a) fit[a] += weighed * phi[a];
+    }
+    double total = 0;
+    phi = s.polynomial.data();
+    for (std::size_t k = 0; k < family.size(); ++k, phi += s.count) {
+      Row z = t[k];
+      for (std::size_t a = 0; a < s.count; ++a) z -= fit[a] * phi[a];
+      t[k] = spring(s, k, z, total);
+    }
+    return total;
+  }
+
   /// t <- t_k by bond; sum_k z_ik . t_k.
   double springs(std::size_t r, std::vector<Row>& t) const {
     const Stencil& s = stencils_[static_cast<std::size_t>(stencil_[r])];
+    if (s.count > 0) return springs_of_fit(r, t);
     const auto family = rows_.neighbours(r);
     Row H[D] = {};  // columns
     for (std::size_t k = 0; k < family.size(); ++k) {
@@ -165,9 +220,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     for (std::size_t k = 0; k < family.size(); ++k) {
       Row z = u_[static_cast<std::size_t>(family[k])] - u_[r];
       for (int e = 0; e < D; ++e) z -= H[e] * s.spring[k][e];
-      t[k] = Row{};
-      for (int b = 0; b < D; ++b) t[k] += s.M[b] * (s.spring[k][3] * z[b]);
-      for (int c = 0; c < D; ++c) total += z[c] * t[k][c];
+      t[k] = spring(s, k, z, total);
     }
     return total;
   }
@@ -179,11 +232,12 @@ class StencilPenalty final : public ZeroEnergyPenalty {
     const Stencil& s = stencils_[static_cast<std::size_t>(stencil_[r])];
     const auto family = rows_.neighbours(r);
     Row B[D] = {};  // columns
-    for (std::size_t k = 0; k < family.size(); ++k)
+    const bool linear = s.count == 0;
+    for (std::size_t k = 0; k < family.size() && linear; ++k)
       for (int e = 0; e < D; ++e) B[e] += t[k] * s.spring[k][e];
     for (std::size_t k = 0; k < family.size(); ++k) {
       Row force = t[k];
-      for (int e = 0; e < D; ++e) force -= B[e] * s.gradient[k][e];
+      for (int e = 0; e < D && linear; ++e) force -= B[e] * s.gradient[k][e];
       force *= factor;
       force_[static_cast<std::size_t>(family[k])] -= force;
       force_[r] += force;
@@ -200,7 +254,8 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   RestingBlocks quiet_;
   std::vector<std::int32_t> stencil_;  ///< by row: which stencil, -1 without a gradient
   std::vector<Stencil> stencils_;
-  std::int32_t whole_ = -1;            ///< that of whole families
+  std::vector<std::int32_t> shared_;   ///< likewise, at the set-up
+  std::vector<std::int32_t> own_;      ///< that of a row whose bonds have failed, -1 where none has yet; empty before any has
   AlignedVector<Row> u_, force_;       ///< by row
   std::vector<double> energy_;         ///< likewise, where it is wanted
 };

@@ -31,8 +31,8 @@ std::unique_ptr<Assembly> ZeroEnergyPenalty::make_assembly(const BlockRows& rows
 
 void ZeroEnergyPenalty::report(ModelReport& report) const {
   report.bytes += bytes();
-  if (parts_.formulation.order > 1) return;
-  report.skips.push_back({"adjoint of the penalty through the point gradient", "it vanishes: sum of omega z (x) xi V = 0 (order 1, same omega)",
+  if (parts_.formulation.order > 1 && !whole_fit(parts_)) return;
+  report.skips.push_back({"adjoint of the penalty through the point gradient", "it vanishes: sum of omega z q(xi) V = 0 for each monomial of the fit (same omega)",
                           "a gradient and a divergence"});
 }
 

@@ -4,8 +4,8 @@
 ///   E = 1/2 sum_i sum_j V_j omega_ij z_ij . M_i z_ij,   z_ij = u_ij - H_i xi_ij
 ///   f_k = sum_j omega_kj [(V_j M_k + V_k M_j) u_kj - (V_j M_k H_k + V_k M_j H_j) xi_kj]   (order 1)
 ///
-/// (z_jk = -(u_kj - H_j xi_kj).) E is quadratic: d2E/du2 w = -f(w). At higher orders the gradient's own share remains: see
-/// stencil_penalty.cpp.
+/// (z_jk = -(u_kj - H_j xi_kj).) E is quadratic: d2E/du2 w = -f(w). At higher orders z is what the whole fit leaves, or what its linear
+/// part does, where the gradient's own share remains in the forces: see stencil_penalty.cpp.
 
 #include "terms/penalty/penalty_element.hpp"
 #include "terms/term.hpp"
