@@ -157,7 +157,7 @@ TEST_CASE("an oblique surface cuts cells alike wherever it lies: rounding choose
 
 TEST_CASE("keys about volumes that would change nothing are refused") {
   CHECK(refusal(disc + "volume = \"voronoi\"\n", "")
-            .find("body.lattice.volume: found \"voronoi\" on a lattice; allowed: with jitter > 0") != std::string::npos);
+            .find("body.lattice.volume: found \"voronoi\" on a lattice; allowed: \"cell\"") != std::string::npos);
   CHECK(refusal(disc + "jitter = 0.1\n", "partial_volume = true")
             .find("family.partial_volume: found true on a cloud; allowed: a lattice without jitter") != std::string::npos);
   CHECK(refusal("[body.lattice]\nspacing = 0.1\nlower = [0, 0]\nupper = [1, 1]\n", "partial_volume = true")

@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "perikit/body/body.hpp"
+#include "body/points/point_arithmetic.hpp"
 
 namespace perikit {
 
 namespace {
 
-Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Point cross(const Point& a, const Point& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
@@ -43,11 +41,11 @@ Crack::Crack(std::vector<Point> vertices) : vertices_(std::move(vertices)) {
     }
   }
   if (vertices_.size() == 2) {
-    const Point t = minus(vertices_[1], vertices_[0]);
+    const Point t = vertices_[1] - vertices_[0];
     normal_ = {-t[1], t[0], 0.0};
   } else {
     for (std::size_t i = 2; i < vertices_.size(); ++i) {
-      const Point n = cross(minus(vertices_[i - 1], vertices_[0]), minus(vertices_[i], vertices_[0]));
+      const Point n = cross(vertices_[i - 1] - vertices_[0], vertices_[i] - vertices_[0]);
       for (std::size_t c = 0; c < 3; ++c) normal_[c] += n[c];
     }
   }
@@ -62,7 +60,7 @@ bool Crack::near(const Point& x, double length) const noexcept {
 }
 
 bool Crack::cuts(const Point& a, const Point& b) const noexcept {
-  const double side_a = dot(minus(a, vertices_[0]), normal_), side_b = dot(minus(b, vertices_[0]), normal_);
+  const double side_a = dot(a - vertices_[0], normal_), side_b = dot(b - vertices_[0], normal_);
   // The normal is as long as the crack, or as large as its area. Points on the crack count to one side, all to the same.
   const double square = dot(normal_, normal_), size = vertices_.size() > 2 ? std::sqrt(std::sqrt(square)) : std::sqrt(square);
   const double on_crack = -slack * size * std::sqrt(square);
@@ -70,7 +68,7 @@ bool Crack::cuts(const Point& a, const Point& b) const noexcept {
   const double s = side_a / (side_a - side_b);
   const Point x{a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2])};
   if (vertices_.size() > 2) return inside_polygon(vertices_, normal_, x);
-  const Point t = minus(vertices_[1], vertices_[0]);
+  const Point t = vertices_[1] - vertices_[0];
   const double along = (t[0] * (x[0] - vertices_[0][0]) + t[1] * (x[1] - vertices_[0][1])) / (t[0] * t[0] + t[1] * t[1]);
   return along >= -slack && along <= 1 + slack;
 }

@@ -10,17 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "perikit/body/body.hpp"
+#include "body/points/point_arithmetic.hpp"
 #include "perikit/core/parallel.hpp"
 
 namespace perikit {
-
-inline double dot(const Point& a, const Point& b) noexcept {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-inline Point operator-(const Point& a, const Point& b) noexcept {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
 
 /// Places in boxes of one size, box by box.
 class Boxes {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "body/points/point_arithmetic.hpp"
+
 namespace perikit {
 
 namespace {
@@ -12,16 +14,12 @@ constexpr double cracked = 0.25;         ///< damage from which a point may lie 
 constexpr double least_closing = 0.01;   ///< over the distance of both sides
 constexpr double least_distance = 0.75;  ///< of both sides, over the mean length of the bonds: less is no face
 
-using Vector = std::array<double, 3>;
-
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 /// Mean of some bonds of a family, at rest and as they are.
 struct Side {
-  Vector rest{}, now{};
+  Point rest{}, now{};
   double bonds = 0;
 
-  void add(const Vector& xi, const Vector& y) {
+  void add(const Point& xi, const Point& y) {
     ++bonds;
     for (std::size_t c = 0; c < 3; ++c) {
       rest[c] += (xi[c] - rest[c]) / bonds;
@@ -34,7 +32,7 @@ struct Side {
 /// that is left. The distance counts as negative where the lost side has come to the other side of the point.
 double closing(const Side& lost, const Side& left, double mean_length, double least_stretch) {
   if (lost.bonds == 0 || left.bonds == 0) return 0;
-  Vector before{}, after{};
+  Point before{}, after{};
   for (std::size_t c = 0; c < 3; ++c) {
     before[c] = lost.rest[c] - left.rest[c];
     after[c] = lost.now[c] - left.now[c];
@@ -58,7 +56,7 @@ CrossedFaces find_crossed_faces(const Families& families, ConstFieldView u) {
     double lengths = 0, least_stretch = 0;
     std::size_t next = 0;   // both lists ascend by their far ends
     for (std::size_t k = 0; k < uncut.far.size(); ++k) {
-      Vector xi{}, y{};
+      Point xi{}, y{};
       for (std::size_t c = 0; c < static_cast<std::size_t>(u.components); ++c) {
         const double* const component = u.component(static_cast<int>(c));
         xi[c] = uncut.xi[c][k];

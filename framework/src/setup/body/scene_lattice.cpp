@@ -12,7 +12,7 @@ void check_volumes(const Scene& scene) {
   const bool lattice = scene.body.lattice.has_value();
   if (scene.body.voronoi && lattice && scene.body.lattice->jitter == 0)
     throw InputError(scene.body.volume_position, "body.lattice.volume",
-                     "found \"voronoi\" on a lattice; allowed: with jitter > 0, or family.partial_volume = true");
+                     "found \"voronoi\" on a lattice; allowed: \"cell\", with family.partial_volume = true where `inside` cuts cells, or jitter > 0");
   if (!scene.partial_volume) return;
   const auto refuse = [&](const char* found, const char* allowed) {
     throw InputError(scene.partial_volume_position, "family.partial_volume",

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "body/partition/near_ranks.hpp"
+#include "body/points/point_arithmetic.hpp"
 
 namespace perikit {
 
@@ -24,10 +25,6 @@ bool occupied(const Body& body, std::int32_t p, std::size_t axis, int sign) {
   return body.alive(static_cast<std::size_t>(p + lattice.shift(step)));
 }
 
-double dot(const Point& a, const Point& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
 std::vector<std::int32_t> free_surface_of_cloud(const Body& body) {
   // Of a part no more than families are there.
   const double reach = std::min(2 * body.spacing(), body.horizon());
@@ -38,7 +35,7 @@ std::vector<std::int32_t> free_surface_of_cloud(const Body& body) {
     const Point x = body.position(i);
     const auto vector_to = [&](std::int64_t k) {
       const Point y = body.position(static_cast<std::size_t>(near.neighbour[static_cast<std::size_t>(k)]));
-      return Point{y[0] - x[0], y[1] - x[1], y[2] - x[2]};
+      return y - x;
     };
     Point outward{};
     double volume = 0;
