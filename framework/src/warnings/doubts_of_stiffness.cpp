@@ -250,8 +250,9 @@ void find_thin_body(const Scene& scene, BodyProblem& problem, std::vector<std::s
   const double ratio = bending_energy(problem, box, across, along);
   if (!(std::abs(ratio - 1) >= bending_limit)) return;
   lines.push_back(named("thin", fmt::format("the body has {:.0f} points across along {}: bent uniformly it stores {:.2f} times the energy of the material, and deflections come out too {} by about as much; "
-                                            "more points across; kinematics = {{ type = \"projection\", order = 2 }} comes closest with few",
-                                            box.along(across) / body.spacing(), "xyz"[across], ratio, ratio < 1 ? "large" : "small")));
+                                            "more points across; kinematics = {} comes closest with few",
+                                            box.along(across) / body.spacing(), "xyz"[across], ratio, ratio < 1 ? "large" : "small",
+                                            body.lattice() ? "{ type = \"conventional\", order = 2, stabilization = \"silling\" }" : "{ type = \"projection\", order = 2 }")));
 }
 
 }  // namespace

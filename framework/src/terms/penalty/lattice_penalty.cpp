@@ -5,8 +5,7 @@
 #include "families/resting_blocks.hpp"
 #include "spaces/lattice/lattice_gradient.hpp"
 #include "spaces/lattice/work_of_groups.hpp"
-#include "terms/family_point.hpp"
-#include "terms/penalty/penalty_matrix.hpp"
+#include "terms/penalty/lattice_matrices.hpp"
 #include "terms/penalty/zero_energy_penalty.hpp"
 
 namespace perikit {
@@ -103,18 +102,7 @@ class LatticePenalty final : public ZeroEnergyPenalty {
   }
 
   void set_matrices(const LatticeChunk& chunk) {
-    const LatticePattern& pattern = families_.pattern(chunk);
-    for (int l = 0; l < chunk_points; ++l) {
-      for (int c = 0; c < Matrix::components; ++c) M_.component(c)[chunk.first + l] = 0;
-      if (!(pattern.live >> l & 1) || !penalised(pattern.condition[l])) continue;  // M = 0
-      const auto p = static_cast<std::size_t>(chunk.first + l);
-      double intact = 0, inverse[6], M[6];
-      for (std::size_t s = 0; s < families_.slots.size(); ++s) intact += pattern.b(s, l) * families_.slots.omega[s];
-      families_.inverse_shape(pattern, l, inverse);
-      const double V = families_.volume;
-      parts_.stabilization->penalty(penalty_point(families_, parts_.laws, p, V * intact, inverse), M);
-      for (int c = 0; c < Matrix::components; ++c) M_.component(c)[p] = V * V * M[c];
-    }
+    set_penalty_matrices<D, isotropic>(parts_, families_, chunk, families_.volume * families_.volume, M_);
   }
 
   void set_sums(const LatticeChunk& chunk) {

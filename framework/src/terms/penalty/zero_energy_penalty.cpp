@@ -38,6 +38,7 @@ void ZeroEnergyPenalty::report(ModelReport& report) const {
 
 std::unique_ptr<Term> make_penalty(const PenaltyParts& parts) {
   return with_dimension(parts.families.body().dimension(), [&](auto d) {
+    if (whole_fit(parts) && parts.families.lattice()) return make_lattice_fit_penalty<d>(parts);
     if (parts.formulation.order > 1) return make_stencil_penalty<d>(parts);
     return parts.families.lattice() ? make_lattice_penalty<d>(parts) : make_cloud_penalty<d>(parts);
   });

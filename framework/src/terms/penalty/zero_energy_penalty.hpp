@@ -62,11 +62,13 @@ class ZeroEnergyPenalty : public Term, public AssembledTerm, public SampledTerm,
 /// Over the point gradient of a body.
 std::unique_ptr<Term> make_penalty(const PenaltyParts& parts);
 
-/// Over a point gradient of order 1, on lattices and clouds, and of any order.
+/// Over a point gradient of order 1, on lattices and clouds, of what the whole fit of any order leaves on lattices, and of any order.
 template <int D>
 std::unique_ptr<Term> make_lattice_penalty(const PenaltyParts& parts);
 template <int D>
 std::unique_ptr<Term> make_cloud_penalty(const PenaltyParts& parts);
+template <int D>
+std::unique_ptr<Term> make_lattice_fit_penalty(const PenaltyParts& parts);
 template <int D>
 std::unique_ptr<Term> make_stencil_penalty(const PenaltyParts& parts);
 
