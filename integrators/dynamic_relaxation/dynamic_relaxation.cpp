@@ -18,6 +18,8 @@ namespace {
 
 constexpr double safety = 1.1;            // of the largest eigenvalue, against stiffening within a step
 constexpr double diverging = 1e3;         // residual over the smallest so far, at which the mass is found anew
+constexpr double too_stiff = 3.8;         // Rayleigh quotient of the motion; with the mass that was found it is 4/1.1 at most
+constexpr int stalled = 2000;             // iterations without a smaller residual, of kinetic damping
 constexpr int note_every = 1000;
 
 /// The sum of (a/of_a) (b/of_b): products of small or large numbers leave the range of numbers.
@@ -52,6 +54,15 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
     mass = find_mass(equilibrium);
   };
   bool at_rest = true;   // v holds no motion yet
+  int best = 0;          // iteration of the smallest residual
+  // Of laws with history unloading may be stiffer than the tangent at which the mass was found.
+  const auto raise_mass = [&](double by) {
+    mass *= by;
+    fill(0.0, v_);
+    last_kinetic = 0;
+    at_rest = true;
+    best = solution.iterations;
+  };
   for (;; ++solution.iterations) {
     if (!equilibrium.residual(u, r_)) {
       solution.failure = equilibrium.failure();
@@ -64,7 +75,10 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
       return solution;
     }
     const double residual = equilibrium.residual_norm();
-    smallest = smallest > 0 ? std::min(smallest, residual) : residual;
+    if (!(smallest > 0) || residual < smallest) {
+      smallest = residual;
+      best = solution.iterations;
+    }
     if (mass == 0 || residual > diverging * smallest) {
       start();
       at_rest = true;
@@ -74,6 +88,7 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
         return solution;
       }
     }
+    if (options_.kinetic && solution.iterations - best > stalled) raise_mass(1.5);
     if (at_rest) {
       combine(0.5 / mass, r_, 0, r_, v_);
       at_rest = false;
@@ -94,7 +109,12 @@ Solution Relaxation::solve(Equilibrium& equilibrium, bool extrapolated) {
       // Rayleigh quotient of the motion itself: it tends to the lowest frequency as the others die out.
       const double speed = norm(v_), unit = power_of_two(speed);
       const double curvature = product(v_, last_r_, unit, mass * unit) - product(v_, r_, unit, mass * unit);
-      if (speed > 0) frequency = std::sqrt(std::clamp(curvature / ((speed / unit) * (speed / unit)), 0.0, 3.6));
+      const double quotient = speed > 0 ? curvature / ((speed / unit) * (speed / unit)) : 0.0;
+      if (quotient > too_stiff) {
+        raise_mass(safety * quotient / 4);
+        continue;
+      }
+      if (speed > 0) frequency = std::sqrt(std::clamp(quotient, 0.0, 3.6));
       const double c = frequency;   // critical: c dt/2 = omega
       combine((1 - c) / (1 + c), v_, 1 / (mass * (1 + c)), r_, v_);
     }

@@ -49,6 +49,7 @@ LAWS = {
     "hencky": 'type = "hencky"\n' + MODULI,
     "mooney_rivlin": 'type = "mooney_rivlin"\ndensity = 1.0\nC1 = 0.3\nC2 = 0.08\nbulk_modulus = 1.7',
     "hypoelastic": 'type = "hypoelastic"\n' + MODULI,
+    "j2": 'type = "j2"\n' + MODULI + "\nyield_stress = 0.2\nhardening = 0.1",
 }
 CRITERIA = {
     "none": "",

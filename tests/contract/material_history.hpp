@@ -104,14 +104,9 @@ class HistoryContract : MaterialCheck {
     }
   }
 
-  /// dP is the derivative of the update at fixed history, by central differences of order six.
-  void tangent() {
-    constexpr double weights[] = {3.0 / 4, -3.0 / 20, 1.0 / 60}, h = 1e-3;
-    const std::vector<Path> paths = random_paths();
-    const std::vector<Values> from = histories(follow(paths, 5, true)), H = gradients(paths, 1.2, true);
-    std::vector<Values> directions;
-    for (int p = 0; p < points_; ++p) directions.push_back(random_direction(random_, space_));
-    const Evaluation e = step(H, from, directions);
+  /// The derivative of the update at fixed history along directions, by central differences of order six.
+  std::vector<Values> differences(const std::vector<Values>& H, const std::vector<Values>& from, const std::vector<Values>& directions, double h) const {
+    constexpr double weights[] = {3.0 / 4, -3.0 / 20, 1.0 / 60};
     std::vector<Values> slope(points_, Values(components_, 0.0));
     for (int k = 1; k <= 3; ++k)
       for (const int sign : {1, -1}) {
@@ -122,7 +117,29 @@ class HistoryContract : MaterialCheck {
         for (int p = 0; p < points_; ++p)
           for (int c = 0; c < components_; ++c) slope[p][c] += sign * weights[k - 1] / h * m.P.component(c)[p];
       }
-    for (int p = 0; p < points_; ++p) near("dP from a history (differences)", e.at(e.dP, p), slope[p], 1e-7, stress_scale(e, p));
+    return slope;
+  }
+
+  /// dP is the derivative of the update at fixed history. Where a law has a corner, between elastic and plastic steps say, differences over it say nothing: those of two
+  /// lengths tell. Most points have none nearby.
+  void tangent() {
+    constexpr double tolerance = 1e-7, h = 1e-3;
+    const std::vector<Path> paths = random_paths();
+    const std::vector<Values> from = histories(follow(paths, 5, true)), H = gradients(paths, 1.2, true);
+    std::vector<Values> directions;
+    for (int p = 0; p < points_; ++p) directions.push_back(random_direction(random_, space_));
+    const Evaluation e = step(H, from, directions);
+    const std::vector<Values> slope = differences(H, from, directions, h), shorter = differences(H, from, directions, h / 8);
+    int compared = 0;
+    for (int p = 0; p < points_; ++p) {
+      const double scale = stress_scale(e, p);
+      bool agree = true;
+      for (int c = 0; c < components_; ++c) agree = agree && std::abs(slope[p][c] - shorter[p][c]) <= tolerance * scale;
+      if (!agree) continue;
+      ++compared;
+      near("dP from a history (differences)", e.at(e.dP, p), shorter[p], tolerance, scale);
+    }
+    CHECK_MESSAGE(4 * compared >= 3 * points_, label(), "differences of P from a history have a limit at ", compared, " of ", points_, " points");
   }
 
   /// A step that is a rotation turns the stress and does no work.

@@ -56,6 +56,7 @@ TEARING = {
     "dynamic_relaxation": 'type = "dynamic_relaxation"\nsteps = 6\ntolerance = 1e-6',
 }
 HYPOELASTIC = 'type = "hypoelastic"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3'
+J2 = 'type = "j2"\ndensity = 1.0\nyoungs_modulus = 2.0\npoisson_ratio = 0.3\nyield_stress = 0.01\nhardening = 0.05'
 CRACK = "[[crack]]\nsegment = [[10.0, 8.0], [20.0, 19.0]]\n"
 
 
@@ -214,6 +215,9 @@ def cases(everything, work):
     for name in ("conventional", "baqp", "sub_horizon", "projection") if everything else ("baqp",):
         for cloud in (False, True) if everything else (False,):
             yield "%s, hypoelastic, %s" % (name, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], 2, cloud, material=HYPOELASTIC), ranks, threads
+    for name in ("conventional", "projection", "sub_horizon") if everything else ("projection",):
+        for cloud in (False, True) if everything else (True,):
+            yield "%s, j2, %s" % (name, "cloud" if cloud else "lattice"), scene(KINEMATICS[name], 2, cloud, material=J2), ranks, threads
     for name, text in beyond(everything):
         yield name, text, ranks, threads
     hole = scene(KINEMATICS["conventional"], 2).replace("[sets]", "inside = \"(x - 14)^2 + (y - 12)^2 > 40 && x + y > 6\"\n[sets]")

@@ -59,6 +59,8 @@ def scene(kinematics, dimension=2, cloud=False, integrator='type = "verlet"\nend
     fields = ["displacement", "velocity", "internal_force", "external_force", "strain_energy_density", "reaction"]
     if "hypoelastic" in material:
         fields = ["state:unrotated_stress", "state:work"] + fields
+    if '"j2"' in material:
+        fields = ["state:plastic_strain", "state:equivalent_plastic_strain"] + fields
     return """format = 1
 [body]
 dimension = {dimension}

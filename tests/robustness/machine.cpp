@@ -11,7 +11,7 @@ TEST_CASE("machine: this build computes what is stored, and says its level") {
   const Desk desk;
   const Result check = desk.perikit("check --machine");
   CHECK_MESSAGE(check.status == 0, check.err);
-  CHECK_MESSAGE(contains(check.out, "level " PERIKIT_LEVEL ": energies and forces of 19 parts"), check.out);
+  CHECK_MESSAGE(contains(check.out, "level " PERIKIT_LEVEL ": energies and forces of 20 parts"), check.out);
   CHECK(contains(desk.perikit("--version").out, PERIKIT_LEVEL));
   CHECK(contains(desk.perikit("check scene.toml").out, "# perikit       0.1.0 (" PERIKIT_LEVEL ")"));
   CHECK(desk.perikit("check").status == 2);

@@ -364,3 +364,21 @@ TEST_CASE("questionable: forces on plates of a forgotten thickness, and places f
 TEST_CASE("questionable: expressions without quotes are told of") {
   refused(replaced(plate, "spacing = 1.0", "spacing = dx"), "", "could not determine value type; texts and expressions stand in quotes");
 }
+
+TEST_CASE("questionable: materials that soften, and what plastic materials must be given") {
+  const auto with = [](const std::string& keys) -> std::string {
+    return SceneText{.upper = {8, 5}, .sets = "left = \"x < 2\"\nright = \"x > 6\"", .material = "type = \"j2\"\ndensity = 1\nyoungs_modulus = 2\npoisson_ratio = 0.3\n" + keys,
+                     .further = "[[boundary]]\nset = \"left\"\ndisplacement = [0, 0]\n[[boundary]]\nset = \"right\"\ndisplacement = [0.1, 0]\n", .integrator = "type = \"newton\""};
+  };
+  silent(with("yield_stress = 0.01"));
+  silent(with("yield_stress = 0.01\nhardening = 0.1\nsaturation_stress = 0.02\nsaturation_rate = 20"));
+  for (const std::string soft : {"hardening = -0.001", "hardening = -0.01\nsaturation_stress = 0.02\nsaturation_rate = 20", "hardening = \"-0.02*(x > 5)\""})
+    warned(with("yield_stress = 0.01\n" + soft), "", "the material \"j2\" softens, and has no length of its own");
+  silent(with("yield_stress = 0.01\nhardening = -0.001"), "--set 'run.silence=[\"softening\"]'");
+  refused(with("hardening = 0.1"), "", "yield_stress");
+  refused(with("yield_stress = -0.1"), "", "material.yield_stress: found the number -0.1; allowed: a number > 0 [Pa]");
+  refused(with("yield_stress = 0.01\nsaturation_stress = 0.005\nsaturation_rate = 1"), "", "found saturation_stress = 0.005; allowed: a finite value that is not below yield_stress");
+  refused(with("yield_stress = 0.01\nsaturation_stress = 0.05"), "", "found saturation_rate = 0; allowed: a value > 0 where saturation_stress is above yield_stress");
+  refused(with("yield_stress = 0.01\nhardening = -3"), "", "found hardening = -3; allowed: a finite value above -3 times the shear modulus");
+  refused(with("yield_stress = 0.01"), "--set kinematics.type=ordinary", "with kinematics \"ordinary\", a pair law, which takes elastic constants from it and nothing else; allowed: an elastic material, or a kinematics with gradients");
+}

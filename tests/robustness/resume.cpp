@@ -87,6 +87,18 @@ TEST_CASE("resume: points whose bonds have all failed keep what their laws remem
   }
 }
 
+TEST_CASE("resume: plastic strains go on as they were, in explicit runs and in statics") {
+  const std::string scene = SceneText{
+      .space = "stress", .spacing = 0.25, .lower = {-3.0, 0.0}, .upper = {-1.0, 2.0}, .sets = "low = \"x < -2.7\"\nhigh = \"x > -1.3\"",
+      .material = "type = \"j2\"\ndensity = 127.877\nyoungs_modulus = 2335.36\npoisson_ratio = 0.3\nyield_stress = 20\nhardening = 50",
+      .further = "[[boundary]]\nset = \"low\"\ndisplacement = [0, 0]\n[[boundary]]\nset = \"high\"\ndisplacement = [\"0.1*t^2\", \"0.05*t^2\"]\n"
+                 "[output]\nframes = 3\nhistory_every = 1\nfields = [\"displacement\", \"state:plastic_strain\", \"state:equivalent_plastic_strain\"]\n"
+                 "history = [ { name = \"most\", quantity = \"state:equivalent_plastic_strain\", reduce = \"max\" } ]",
+      .integrator = "type = \"verlet\"\nend_time = 1.0\ntime_step = 2.5e-4"};
+  goes_on_alike(scene, 60);
+  goes_on_alike(replaced(scene, "type = \"verlet\"\nend_time = 1.0\ntime_step = 2.5e-4", "type = \"newton\"\nsteps = 300"), 20);
+}
+
 TEST_CASE("resume: a pressure acts on the surface as it was before bonds failed in the last step") {
   const std::string scene = SceneText{
       .dimension = 3, .spacing = 3, .lower = {-15, 0, 0}, .upper = {-3, 15, 12}, .sets = "low = \"z < 3.003\"\nhigh = \"z > 8.997\"", .family = "horizon = 6.045",

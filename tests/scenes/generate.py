@@ -6,6 +6,8 @@ A wish decides what chance would: wishes = {"kinematics": "baqp", "body": "voron
 Values of physical meaning (lengths, stiffnesses, loads, times) follow from a random scale of the body: waves cross it about once, strains are 1e-3 to 0.3. Every
 other key gets a value that its table allows, so that a new key or part is tried without a change here."""
 
+import random
+
 from conditions import STATICS, Conditions
 from draws import AXES, as_table, rounded
 
@@ -29,6 +31,9 @@ class Generator(Conditions):
     def __init__(self, tables, seed, explicit_only=False, wishes=None):
         super().__init__(tables, seed, wishes)
         self.explicit_only = explicit_only
+        # Drawn apart, so that other draws are what they were before there were any.
+        self.plastic = [name for name, table in tables.parts["material"].items() if "yield_stress" in table.keys]
+        self.random_of_plastic = random.Random("plastic %s" % seed)
 
     # -- parts whose keys have a scale --------------------------------------------------------------------------------------------------------
 
@@ -45,6 +50,10 @@ class Generator(Conditions):
         values = {"density": self.rho, "youngs_modulus": E, "poisson_ratio": nu, "shear_modulus": mu, "bulk_modulus": K,
                   "lame_lambda": K - 2 * mu / 3, "C1": 0.35 * mu, "C2": 0.15 * mu}
         hints = {key: rounded(value) for key, value in values.items()}
+        if name in self.plastic:
+            yields = E * self.strain * self.between(0.1, 1)
+            hints |= {"yield_stress": rounded(yields), "saturation_stress": rounded(1.5 * yields), "saturation_rate": lambda: rounded(self.scale(0, 2)),
+                      "hardening": lambda: rounded(E * self.scale(-3, -1) * self.random.choice([1, 1, 1, -0.01]))}
         hints["density"] = self.varying(self.rho)
         for key in ("youngs_modulus", "shear_modulus"):
             hints[key] = lambda value=values[key]: self.varying(value, 0.04) if self.maybe(0.9) else self.number(value)
@@ -96,7 +105,7 @@ class Generator(Conditions):
         scene["kinematics"] = self.kinematics()
         if self.kinematics_name in PAIR_LAWS and self.dimension > 1 and scene["family"].get("horizon_ratio") == 1.015:
             scene["kinematics"] = as_table(scene["kinematics"]) | {"surface_correction": "none"}   # nearest neighbours are too few for factors
-        laws = list(self.tables.parts["material"])
+        laws = [name for name in self.tables.parts["material"] if name not in self.plastic]
         scene["material"] = self.law(laws)
         failing = self.integrator_name != "evaluate" and self.maybe(0.45)
         failing = self.wishes.get("damage", "none" if not failing else "") != "none"
@@ -137,6 +146,13 @@ class Generator(Conditions):
 
     def law(self, laws):
         part = self.part("material", among=laws)
+        plastic = self.plastic and self.random_of_plastic.random() < (0.0 if self.wishes else 0.15) or self.wishes.get("material") in self.plastic
+        if plastic and self.kinematics_name not in PAIR_LAWS:
+            others, self.random = self.random, self.random_of_plastic
+            part = self.part("material", among=self.plastic)
+            if isinstance(part, dict) and "saturation_stress" in part:
+                part.setdefault("saturation_rate", rounded(self.scale(0, 2)))
+            self.random = others
         return {"density": rounded(self.rho)} | as_table(part)
 
     def other_law(self, laws):

@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
+#include "perikit/core/field.hpp"
+#include "perikit/core/warnings.hpp"
 #include "setup/numeric_values.hpp"
 
 namespace perikit {
@@ -79,7 +83,52 @@ MaterialRecord build_record(const PartValues& part, const Scene& scene, const Pa
   return record;
 }
 
+/// Whether the stress falls in a stretch that grows in steps, at constant volume.
+bool softens(const Material& material, const std::vector<double>& constants) {
+  Field H(9, padding), P(9, padding), begin(material.state_components(Space::solid), padding), end(begin.components(), padding), given(static_cast<int>(constants.size()), padding);
+  for (std::size_t k = 0; k < constants.size(); ++k)
+    for (std::size_t l = 0; l < padding; ++l) given.component(static_cast<int>(k))[l] = constants[k];
+  double before = 0;
+  for (double strain = 1e-4; strain < 1; strain *= 1.1) {
+    H.component(0)[0] = std::expm1(strain);
+    H.component(4)[0] = H.component(8)[0] = std::expm1(-0.5 * strain);
+    MaterialBatch batch{.n = 1, .stride = padding, .H = H.data(), .constants = given.data(), .constant_stride = padding};
+    batch.state_old = begin.data(), batch.state_new = end.data(), batch.state_stride = padding, batch.P = P.data();
+    if (!material.evaluate(Space::solid, batch).ok()) return false;
+    const double stress = P.component(0)[0] * std::exp(strain) - P.component(4)[0] * std::exp(-0.5 * strain);
+    if (stress < before * (1 - 1e-9)) return true;
+    before = stress;
+    std::swap(begin, end);
+  }
+  return false;
+}
+
 }  // namespace
+
+std::vector<std::string> softening(const Scene& scene, const Body& body, const Laws& laws) {
+  constexpr std::size_t samples = 64;   // of constants that vary in place
+  std::vector<std::string> warnings;
+  const auto parts = materials(scene);
+  for (std::size_t id = 0; id < parts.size(); ++id) {
+    const MaterialRecord& record = laws.records()[id];
+    if (record.material->state_components(Space::solid) == 0) continue;
+    const auto count = static_cast<std::size_t>(record.traits.constants);
+    bool found = record.uniform && softens(*record.material, {record.constants.begin(), record.constants.begin() + static_cast<std::ptrdiff_t>(count)});
+    const auto points = body.owned();
+    for (std::size_t i = 0; !record.uniform && !found && i < points.size(); i += std::max<std::size_t>(points.size() / samples, 1)) {
+      const auto p = static_cast<std::size_t>(points[i]);
+      if (!body.material_ids().empty() && body.material_ids()[p] != id) continue;
+      std::vector<double> one(count);
+      for (std::size_t k = 0; k < count; ++k) one[k] = record.constants[k * body.stride() + p];
+      found = softens(*record.material, one);
+    }
+    if (found)
+      warnings.push_back(named("softening", fmt::format("the material \"{}\" softens, and has no length of its own: strains gather in bands whose width follows from the horizon and the spacing, so that what the "
+                                                        "body carries beyond its largest load, and what it dissipates, depend on both",
+                                                        parts[id]->type)));
+  }
+  return warnings;
+}
 
 std::vector<std::shared_ptr<const PartValues>> materials(const Scene& scene) {
   std::vector<std::shared_ptr<const PartValues>> parts{scene.material};

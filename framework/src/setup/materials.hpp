@@ -23,6 +23,10 @@ std::unique_ptr<Laws> build_laws(const Scene& scene, const PartFactory& factory,
 /// A law that stores nothing.
 MaterialRecord silent_record();
 
+/// Warnings of materials with history that soften: their stress falls where a stretch grows that keeps the volume, tried to a logarithmic strain of 1. No material has a
+/// length of its own over which it would.
+std::vector<std::string> softening(const Scene& scene, const Body& body, const Laws& laws);
+
 /// What to say of the first point without a density; nothing where all have one.
 std::optional<InputError> missing_density(const Scene& scene, const Body& body, const Laws& laws);
 

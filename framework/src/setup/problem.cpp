@@ -235,6 +235,8 @@ void refuse_history(const Scene& scene, const Laws& laws, const Formulation& for
                        fmt::format("found \"{}\", a law whose stress depends on the path, with {}; allowed: {}", part.type, with, allowed));
     };
     if (formulation.force_state == ForceState::local) refuse("force_state = \"local\"", "a material without history, or \"variational\"");
+    if (formulation.pairs && laws.records()[id].traits.dissipates)
+      refuse(fmt::format("kinematics \"{}\", a pair law, which takes elastic constants from it and nothing else", scene.kinematics->type), "an elastic material, or a kinematics with gradients");
   }
 }
 
@@ -260,7 +262,7 @@ std::unique_ptr<BodyProblem> build_problem(const Scene& scene, const PartFactory
   parts.families = build_families(scene, factory, body, of_terms.formulation);
   refuse_order(scene, of_terms.formulation, *parts.families);
   const auto ghosts = partition ? std::make_unique<Ghosts>(*partition, 1) : nullptr;
-  std::vector<std::string> warnings;
+  std::vector<std::string> warnings = softening(scene, body, *parts.laws);
   refuse_thin_pieces(scene, *parts.families, ghosts.get(), warnings);
   of_terms.families = parts.families.get();
   of_terms.laws = parts.laws.get();

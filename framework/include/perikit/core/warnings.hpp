@@ -39,6 +39,7 @@ inline constexpr auto warning_kinds = std::to_array<std::string_view>({
     "set",
     "singular",
     "small_strains",
+    "softening",
     "stairs",
     "thickness",
     "thin",
