@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "families/family_arrays.hpp"
 #include "perikit/core/communicator.hpp"
 
