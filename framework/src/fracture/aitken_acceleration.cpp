@@ -6,12 +6,17 @@ namespace perikit {
 
 namespace {
 
-constexpr double most = 0.999;      // ratio: slower ones may be no series that ends
+// Ratios that are believed: of series that may be none that ends, those alone that have gone on for long. Near the limit of stability 0.996 was met, which without forecasts would go on for more than 1000 rounds.
+constexpr double most = 0.98, most_later = 0.999;
+constexpr int patience = 100;       // rounds
 constexpr double cautious = 0.5;    // share of what is still to come
 
 }  // namespace
 
+double AitkenAcceleration::most_ratio() const noexcept { return rounds_ > patience ? most_later : most; }
+
 std::vector<double> AitkenAcceleration::ratios(const std::vector<BondChange>& changes, const std::vector<double>& from) {
+  ++rounds_;
   std::map<BondId, double> falls;
   std::vector<double> ratios;
   for (std::size_t k = 0; k < changes.size(); ++k) {
@@ -27,7 +32,7 @@ std::vector<double> AitkenAcceleration::ratios(const std::vector<BondChange>& ch
 void AitkenAcceleration::accelerate(std::vector<BondChange>& changes, const std::vector<double>& from) {
   const std::vector<double> ratio = ratios(changes, from);
   for (std::size_t k = 0; k < changes.size(); ++k) {
-    if (!(ratio[k] < most)) continue;
+    if (!(ratio[k] < most_ratio())) continue;
     BondChange& change = changes[k];
     const double fall = from[k] - change.integrity;
     change.integrity = std::max(change.integrity - cautious * fall * ratio[k] / (1 - ratio[k]), least_left * change.integrity);
@@ -39,7 +44,7 @@ std::vector<BondId> AitkenAcceleration::settling(const std::vector<BondChange>& 
   const std::vector<double> ratio = ratios(changes, from);
   std::vector<BondId> bonds;
   for (std::size_t k = 0; k < changes.size(); ++k)
-    if (ratio[k] < most && changes[k].integrity > 0) bonds.push_back(changes[k].bond);
+    if (ratio[k] < most_ratio() && changes[k].integrity > 0) bonds.push_back(changes[k].bond);
   return bonds;
 }
 

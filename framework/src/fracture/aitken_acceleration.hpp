@@ -21,13 +21,20 @@ class AitkenAcceleration {
   void accelerate(std::vector<BondChange>& changes, const std::vector<double>& from);
   /// Those of them whose falls form such a series and leave something: how far it goes is for others to say.
   std::vector<BondId> settling(const std::vector<BondChange>& changes, const std::vector<double>& from);
-  void forget() { last_.clear(); }
+  void forget() {
+    last_.clear();
+    rounds_ = 0;
+  }
 
  private:
   /// Falls over those in the last round, which these are from now on; 1 where a bond did not fall in it.
   std::vector<double> ratios(const std::vector<BondChange>& changes, const std::vector<double>& from);
 
+  /// Slower series may be none that ends.
+  double most_ratio() const noexcept;
+
   std::map<BondId, double> last_;  ///< fall in the last round, of bonds that fell undisturbed
+  int rounds_ = 0;                 ///< at this load
 };
 
 }  // namespace perikit
