@@ -77,7 +77,7 @@ double equivalent(const Matrix3d& tau) { return std::sqrt(1.5) * deviator(tau).n
 /// The same law in another way: F_p itself is kept, F_e = F F_p^-1, C_e = F_e^T F_e in the intermediate configuration, the increment by bisection, F_p1 = exp(increment) F_p0.
 struct Reference {
   Flow flow;
-  Matrix3d Fp = Matrix3d::Identity(), tau;
+  Matrix3d Fp = Matrix3d::Identity(), tau = Matrix3d::Zero();
   double a = 0;
 
   void step(const Matrix3d& F) {
@@ -180,7 +180,7 @@ TEST_CASE("plastic: cyclic simple shear to 200 % against a return mapping with F
   for (const int steps : {1, 10, 1000}) {
     CAPTURE(steps);
     const End end = follow(Space::solid, there_and_back, steps, flow.constants());
-    Reference reference{flow};
+    Reference reference{.flow = flow};
     for (int n = 1; n <= steps; ++n) reference.step(there_and_back(double(n) / steps));
     const Matrix3d tau = end.P * there_and_back(1).transpose();
     CHECK_MESSAGE((tau - reference.tau).norm() <= 1e-10 * reference.tau.norm(), (tau - reference.tau).norm());

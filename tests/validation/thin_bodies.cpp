@@ -196,7 +196,9 @@ TEST_CASE("thin bodies: the force at the end of a cantilever of three points acr
   // Timoshenko and Goodier's cantilever in layers at both ends, of which the right one is pulled by P in the exact solution.
   const std::array<std::pair<int, double>, 4> bounds{std::pair{3, 0.02}, {4, 0.02}, {6, 0.015}, {12, 0.005}};
   for (const double ratio : {2.015, 3.015})
-    for (const auto& [n, bound] : bounds) {
+    for (const std::pair<int, double>& body : bounds) {
+      const int n = body.first;
+      const double bound = body.second;
       constexpr double length = 8, P = 1e-3;
       const double h = 1.0 / n, layer = std::min(2 * ratio * h, 2.2);
       const std::string y = "(y - 0.5)", by = fmt::format("{:.17g}", P / (6 * youngs_modulus / 12)), nu = fmt::format("{}", poisson_ratio);

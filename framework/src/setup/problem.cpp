@@ -53,7 +53,7 @@ Beyond place_images(const Scene& scene, Body& body, bool quasi_static) {
 }
 
 /// How far the forces of a formulation reach (partition.hpp).
-Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
+Partition::Reach reach_of(const Formulation& formulation) {
   return {.bonds = formulation.bond && formulation.far_share > 0 ? 3 : 2,
           .blocks = formulation.weighted != nullptr || (formulation.point && formulation.order > 1),
           .sources = formulation.pairs != nullptr};  // samples of bonds to images ask for the moduli of both ends
@@ -62,7 +62,7 @@ Partition::Reach reach_of(const Scene& scene, const Formulation& formulation) {
 /// The body of this rank, which no rank has as a whole.
 Beyond place_part(const Scene& scene, const PartFactory& factory, const Formulation& formulation, ProblemParts& parts, bool quasi_static) {
   try {
-    LocalBody local = build_local_body(scene, reach_of(scene, formulation), far_material(scene, has_images(scene)), image_material(scene), quasi_static);
+    LocalBody local = build_local_body(scene, reach_of(formulation), far_material(scene, has_images(scene)), image_material(scene), quasi_static);
     parts.body = std::make_unique<const Body>(std::move(local.body));
     parts.partition = std::move(local.partition);
     Beyond beyond;
