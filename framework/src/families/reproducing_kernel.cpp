@@ -47,6 +47,10 @@ struct Monomials {
       }
     }
   }
+
+  Eigen::VectorXd root() const { return weight.cwiseSqrt(); }
+  /// W^(1/2) q^T = Q R
+  Eigen::HouseholderQR<Eigen::MatrixXd> qr() const { return Eigen::HouseholderQR<Eigen::MatrixXd>(root().asDiagonal() * q.transpose()); }
 };
 
 /// By bond and axis: sum_a of_monomial(a, e) (M^-1 q(xi_k))_a omega V_k, M^-1 q W = R^-1 Q^T W^(1/2) with W^(1/2) q^T = Q R, whose condition is the root of
@@ -54,12 +58,11 @@ struct Monomials {
 /// lose seven digits. of_monomial is overwritten.
 Eigen::MatrixXd weigh_monomials(const Monomials& monomials, Eigen::MatrixXd& of_monomial) {
   const Eigen::Index size = monomials.q.rows(), bonds = monomials.q.cols();
-  const Eigen::VectorXd root = monomials.weight.cwiseSqrt();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(root.asDiagonal() * monomials.q.transpose());
+  const auto qr = monomials.qr();
   qr.matrixQR().topRows(size).triangularView<Eigen::Upper>().transpose().solveInPlace(of_monomial);   // R^-T
   Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(bonds, of_monomial.cols());
   spread.topRows(size) = of_monomial;
-  return (qr.householderQ() * spread).transpose() * root.asDiagonal();
+  return (qr.householderQ() * spread).transpose() * monomials.root().asDiagonal();
 }
 
 bool exactly(const FamilyArrays& family, double horizon, int order, std::vector<double>& g) {
@@ -115,7 +118,7 @@ void kernel_residuals(const FamilyArrays& family, double horizon, int order, std
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Monomials monomials(family, horizon, order);
   Eigen::Map<Rows> values(z.data(), family.bonds, static_cast<Eigen::Index>(z.size()) / family.bonds);
-  const Eigen::VectorXd root = monomials.weight.cwiseSqrt();
+  const Eigen::VectorXd root = monomials.root();
   const Eigen::MatrixXd weighted = root.asDiagonal() * monomials.q.transpose();
   const Eigen::MatrixXd coefficients = weighted.householderQr().solve(root.asDiagonal() * values);
   values -= monomials.q.transpose() * coefficients;
@@ -125,8 +128,8 @@ std::size_t orthonormal_polynomials(const FamilyArrays& family, double horizon, 
   phi.clear();
   if (order < 1) return 0;
   const Monomials monomials(family, horizon, order);
-  const Eigen::VectorXd root = monomials.weight.cwiseSqrt();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(root.asDiagonal() * monomials.q.transpose());
+  const Eigen::VectorXd root = monomials.root();
+  const auto qr = monomials.qr();
   const Eigen::Index count = monomials.q.rows();
   const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(family.bonds, count);
   phi.reserve(static_cast<std::size_t>(family.bonds * count));

@@ -7,6 +7,15 @@
 
 namespace perikit {
 
+/// Number of monomials of degree 1 ... order: as many bonds, at least, must a family have.
+constexpr int monomials(int dimension, int order) {
+  int count = 1;
+  for (int c = 1; c <= dimension; ++c) count = count * (order + c) / c;
+  return count - 1;
+}
+/// Of the highest order that a point gradient can have, in space.
+inline constexpr std::size_t most_monomials = monomials(3, 8);
+
 /// Point gradient that is exact for polynomials of total degree `order` (reproducing kernel) [Partmann et al. 3.43-3.53]:
 ///   g_k = omega V_k (M^-1 q(xi_k))_linear / delta,  M = sum_k omega V_k q q^T,  q: monomials of xi/delta of degree 1 ... order.
 /// g[k * D + e]. Takes the highest order not above `order` that the family supports; returns it, 0 (and g = 0) for none.

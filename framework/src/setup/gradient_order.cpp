@@ -5,20 +5,10 @@
 #include <optional>
 
 #include "families/family_arrays.hpp"
+#include "families/reproducing_kernel.hpp"
 #include "perikit/core/communicator.hpp"
 
 namespace perikit {
-
-namespace {
-
-/// Number of monomials of degree 1 ... order: as many bonds, at least, must a family have.
-int monomials(int dimension, int order) {
-  int count = 1;
-  for (int c = 1; c <= dimension; ++c) count = count * (order + c) / c;
-  return count - 1;
-}
-
-}  // namespace
 
 void refuse_order(const Scene& scene, const Formulation& formulation, const Families& families) {
   if (formulation.order < 2) return;

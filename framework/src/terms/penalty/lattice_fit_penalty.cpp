@@ -13,9 +13,6 @@ namespace perikit {
 
 namespace {
 
-/// Polynomials of degree 1 and 2 in D dimensions.
-constexpr std::size_t of_second_order(int D) { return static_cast<std::size_t>(D + D * (D + 1) / 2); }
-
 /// The penalty on what the whole fit leaves, on a lattice. With r = sqrt(omega V) of a bond and the orthonormal polynomials phi_a of its family
 /// (families/reproducing_kernel.hpp), psi_a = r phi_a,
 ///
@@ -26,15 +23,13 @@ template <int D, bool isotropic>
 class LatticeFitPenalty final : public ZeroEnergyPenalty {
   using Matrix = PenaltyMatrix<D, isotropic>;
   static constexpr int packs = chunk_points / pack_width;
-  static constexpr std::size_t most_polynomials = 164;   ///< order 8 in space
+  static constexpr std::size_t of_second_order = monomials(D, 2);
 
  public:
   explicit LatticeFitPenalty(const PenaltyParts& parts)
       : ZeroEnergyPenalty(parts), families_(*parts.families.lattice()), M_(families_.body().make_field(Matrix::components)) {
     if (parts.skip) quiet_ = RestingBlocks(families_.tiles.reach);
-    count_ = 1;
-    for (int c = 1; c <= D; ++c) count_ = count_ * static_cast<std::size_t>(parts.formulation.order + c) / static_cast<std::size_t>(c);
-    --count_;
+    count_ = static_cast<std::size_t>(monomials(D, parts.formulation.order));
     stencils_.assign((families_.patterns.size() + 1) * size(), 0.0);
     std::vector<const LatticeChunk*> example(families_.patterns.size() + 1, nullptr);
     for (const LatticeChunk& chunk : families_.tiles.chunks) example[static_cast<std::size_t>(chunk.pattern + 1)] = &chunk;
@@ -121,16 +116,16 @@ class LatticeFitPenalty final : public ZeroEnergyPenalty {
   }
 
   void pull(const LatticeChunk& chunk, ConstFieldView u, double factor, const FieldView* force, double* energy) const noexcept {
-    const bool second = count_ == of_second_order(D);
-    if (chunk.pattern < 0) second ? pull<true, of_second_order(D)>(chunk, u, factor, force, energy) : pull<true, 0>(chunk, u, factor, force, energy);
-    else second ? pull<false, of_second_order(D)>(chunk, u, factor, force, energy) : pull<false, 0>(chunk, u, factor, force, energy);
+    const bool second = count_ == of_second_order;
+    if (chunk.pattern < 0) second ? pull<true, of_second_order>(chunk, u, factor, force, energy) : pull<true, 0>(chunk, u, factor, force, energy);
+    else second ? pull<false, of_second_order>(chunk, u, factor, force, energy) : pull<false, 0>(chunk, u, factor, force, energy);
   }
 
   /// force += -factor dE/du of the points of the chunk, and their energies; null: not wanted. known: how many polynomials there are, 0: count_.
   template <bool whole, std::size_t known>
   void pull(const LatticeChunk& chunk, ConstFieldView u, double factor, const FieldView* force, double* energy) const noexcept {
     const std::size_t count = known > 0 ? known : count_;
-    constexpr std::size_t most = known > 0 ? known : most_polynomials, lanes = whole ? 1 : chunk_points;
+    constexpr std::size_t most = known > 0 ? known : most_monomials, lanes = whole ? 1 : chunk_points;
     const LatticePattern& pattern = families_.pattern(chunk);
     const double* const stored = stencils_.data() + place(chunk);
     const std::size_t slots = families_.slots.size();

@@ -2,6 +2,7 @@
 
 #include "families/cloud/cloud_rows.hpp"
 #include "families/lattice/lattice_families.hpp"
+#include "families/reproducing_kernel.hpp"
 #include "families/resting_blocks.hpp"
 #include "terms/penalty/zero_energy_penalty.hpp"
 
@@ -17,7 +18,6 @@ namespace {
 /// polynomials, and t_k is all.
 template <int D>
 class StencilPenalty final : public ZeroEnergyPenalty {
-  static constexpr std::size_t most_polynomials = 164;   ///< order 8 in space
   /// What points with equal families have in common: by bond, and M.
   struct Stencil {
     std::vector<Row> spring;           ///< {xi, w}
@@ -186,7 +186,7 @@ class StencilPenalty final : public ZeroEnergyPenalty {
   double springs_of_fit(std::size_t r, std::vector<Row>& t) const {
     const Stencil& s = stencils_[static_cast<std::size_t>(stencil_[r])];
     const auto family = rows_.neighbours(r);
-    Row fit[most_polynomials];
+    Row fit[most_monomials];
     std::fill_n(fit, s.count, Row{});
     t.resize(family.size());
     const double* phi = s.polynomial.data();
